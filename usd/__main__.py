@@ -10,8 +10,8 @@ from .border.stopping import end_at_once, stoppable
 def main() -> None:
     """Entry point."""
     _never_none()
-    # Strands, frames and pictures share the cores. OpenBLAS would start threads of its own for every small product, and
-    # they wait for the next one by spinning: a clip takes a third longer with them. It reads this when numpy is imported.
+    # Strands, frames and pictures share the cores. OpenBLAS would start its own threads for every small product, and they spin
+    # while they wait for the next one: a clip then takes a third longer. It reads this variable when numpy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         with stoppable():
@@ -23,7 +23,7 @@ def main() -> None:
 
 
 def _never_none() -> None:
-    """Give a process whose output was closed by its caller, as a job without a console may be, somewhere to write."""
+    """Give a process whose caller closed its output, such as a job without a console, somewhere to write."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))

@@ -13,19 +13,19 @@ from ..border.units import Border
 
 
 def write_animation(stage: Usd.Stage, path: str, character: Character, clip: Clip) -> UsdSkel.Animation:
-    """Author a clip of a character on a stage as joint samples, one per clip time, whose zero is time code 1.
+    """Author a clip of a character on a stage as joint samples, one per clip time; clip time zero is time code 1.
 
-    A joint's scale is left at one. The skeleton is taken to stand at the stage's origin.
+    Joint scales stay at one. The skeleton is assumed to stand at the stage's origin.
 
     Args:
         stage: its unit, up axis and rate are honoured.
         path: prim path of the animation.
-        character: whose joints they are; the skeleton prim must hold the same paths.
+        character: whose joints are written; the skeleton prim must have the same joint paths.
         clip: what to write.
     """
     border = Border.of(stage)
     world = border.from_core @ clip.joints
-    # A joint's own axes keep unit length in the stage's unit; only its place is scaled.
+    # A joint's own axes keep unit length in the stage's unit; only its position is scaled.
     world[..., :3, :3] = rotation.rotation_part(world, path)
     local = rotation.relative_to_parents(world, character.skeleton.parents)
     turns = rotation.continuous(rotation.to_quaternion(local[..., :3, :3]))

@@ -13,11 +13,11 @@ from neuralocks_core.groom import Groom
 from ..skel.surface import ever_visible, rest_primvar
 
 KNOWN = ("st", "displayColor", "displayOpacity")
-"""Primvars that go on with the curves whatever their type, besides all that begin with `groom_`."""
+"""Primvars that are kept whatever their type, besides all whose names begin with `groom_`."""
 OWN = ("groom_version_major", "groom_version_minor", "groom_tool")
-"""Those that say what wrote the file."""
+"""Primvars that say what wrote the file."""
 READ = ("widths", rest_copy.NAME)
-"""Those that are read into the groom."""
+"""Primvars that are read into the groom."""
 OF_A_SPACE = (Sdf.ValueRoleNames.Point, Sdf.ValueRoleNames.Vector, Sdf.ValueRoleNames.Normal, Sdf.ValueRoleNames.Frame)
 """Roles of values that belong to the space which the curves come from."""
 
@@ -34,10 +34,10 @@ class Primvar(NamedTuple):
 
 @dataclass(frozen=True)
 class Beside:
-    """What stands beside a groom's strands.
+    """What curves have besides the groom's strands.
 
     Attributes:
-        primvars: what other tools put on them.
+        primvars: what other tools put on the curves.
         purpose: the token of UsdGeomImageable.
         visible: whether they are ever shown.
     """
@@ -47,7 +47,7 @@ class Beside:
     visible: bool = True
 
     def author(self, curves: UsdGeom.BasisCurves) -> None:
-        """Give it to curves."""
+        """Write it to curves."""
         for *arguments, value in self.primvars:
             UsdGeom.PrimvarsAPI(curves).CreatePrimvar(*arguments).Set(value)
         if self.purpose != UsdGeom.Tokens.default_:
@@ -57,11 +57,11 @@ class Beside:
 
 
 def read_beside(prim: Usd.Prim, groom: Groom, notes: list[str]) -> Beside:
-    """What goes on with curves; with notes on what does not.
+    """Read what an import keeps, with notes on what it drops.
 
     Args:
         prim: the curves.
-        groom: as they were read.
+        groom: the curves as read.
         notes: what a user should know is added here.
     """
     primvars = _read_primvars(prim, groom, notes)
@@ -97,7 +97,7 @@ def _read_primvars(prim: Usd.Prim, groom: Groom, notes: list[str]) -> tuple[Prim
 
 
 def _stays(kind: Sdf.ValueTypeName) -> str:
-    """Why values of a type do not go on to another file, where units and axes are others; '' if they do."""
+    """Why values of a type are not copied to a file with other units and axes; '' if they are."""
     if kind.scalarType == Sdf.ValueTypeNames.Asset:
         return "names files, whose paths may not resolve from elsewhere"
     if kind.role in OF_A_SPACE or str(kind.scalarType).startswith(("matrix", "frame")):
@@ -106,7 +106,7 @@ def _stays(kind: Sdf.ValueTypeName) -> str:
 
 
 def _varying_sizes(curves: UsdGeom.BasisCurves, points: int) -> set[int]:
-    """How many varying values curves of so many points in all may have: one for each end of a segment."""
+    """How many varying values curves with this many points in all may have: one for each end of a segment."""
     sizes = {curves.ComputeVaryingDataSize(Usd.TimeCode.EarliestTime())}
     # Pinned curves are drawn through their first and last points, too; not all tools count segments there.
     return sizes | ({points} if curves.GetWrapAttr().Get() == UsdGeom.Tokens.pinned else set())

@@ -23,12 +23,12 @@ def write_body(path, body: StatisticalBody | None = None, *, phenotype: dict[str
     """Write the statistical body as a USD character: metres, Y up, facing +Z, at rest.
 
     Args:
-        path: file to write (.usd, .usda, .usdc); replaced as a whole when all is written.
-        body: what to write; the default builds anny, about a minute the first time.
+        path: file to write (.usd, .usda, .usdc); replaced once everything is written.
+        body: what to write; the default builds anny, which takes about a minute the first time.
         phenotype: anny's parameters, 0..1, for the default body.
 
     Raises:
-        NeuralocksError: the path has another ending or cannot be written, anny is missing or a phenotype is wrong.
+        NeuralocksError: the path has another extension or cannot be written, anny is missing or a phenotype is wrong.
     """
     path = as_path(path, "path")
     check_layer_name(path)
@@ -50,7 +50,7 @@ def _author(stage, body: StatisticalBody) -> None:
     binding, skin = bind_to(skeleton, mesh.GetPrim(), np.eye(4)), body.character.body
     author_influences(binding, skin.joint_indices, skin.joint_weights)
     _blend_shapes(stage, binding, skin.shapes)
-    # A skinned mesh moves beyond its own points: the root's extent is the answer that usdview and the validators read.
+    # A skinned mesh moves beyond its own points, so usdview and the validators read the root's extent.
     UsdGeom.Boundable(root).CreateExtentAttr(vectors([skin.points.min(axis=0), skin.points.max(axis=0)]))
 
 

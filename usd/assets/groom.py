@@ -26,7 +26,7 @@ from .prims import POLYLINES, Spline, author_curves
 
 USD = (*LAYERS, ".usdz")
 BELOW = 0.02
-"""How far below the lowest root the middle of a head lies, at least [m]."""
+"""The middle of a head is at least this far below the lowest root [m]."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Authored:
     Attributes:
         groom: the strands.
         spline: how a renderer interpolates them.
-        beside: what else they have.
+        beside: what else the curves have.
     """
 
     groom: Groom
@@ -50,14 +50,14 @@ def import_groom(source, out, unit: str | float | None = None, up: str | None = 
     Args:
         source: the hair file.
         out: USD file to write.
-        unit: "mm", "cm", "in", "m" or metres per unit of the source; what the file says, or suits a head, if left out.
+        unit: "mm", "cm", "in", "m" or metres per unit of the source; if left out, what the file says, or what suits a head.
         up: "Y" or "Z", the source's upward axis.
 
     Returns:
         The grooms, and what a user should know.
 
     Raises:
-        NeuralocksError: the source cannot be read or the target not be written.
+        NeuralocksError: the source cannot be read or the target cannot be written.
     """
     source, out = as_path(source, "source"), as_path(out, "out")
     if source.suffix.lower() in (*USD, *OTHERS):
@@ -77,15 +77,15 @@ def write_groom(path, groom: Groom, border: Border | None = None) -> Path:
 
 
 def write_grooms(path, grooms: list[Authored], border: Border | None = None) -> Path:
-    """Write grooms below one root prim `/Groom`, at once under the final name.
+    """Write grooms below one root prim `/Groom`; the file is complete once it has its final name.
 
     Args:
         path: USD file to write.
         grooms: in metres, Y up.
-        border: of the stage that they are made for, whose unit and axis the file takes; metres and Y up if left out.
+        border: of the stage that the grooms are made for, whose unit and axis the file uses; metres and Y up if left out.
 
     Raises:
-        NeuralocksError: the path has another ending or cannot be written.
+        NeuralocksError: the path has another extension or cannot be written.
     """
 
     def author(stage: Usd.Stage) -> None:
@@ -105,8 +105,8 @@ def write_grooms(path, grooms: list[Authored], border: Border | None = None) -> 
 def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = POLYLINES) -> UsdGeom.BasisCurves:
     """Define a BasisCurves prim for a groom in a stage of metres, Y up.
 
-    The `groom_*` primvars are those that Unreal and other groom readers know. Root UVs that a groom has not are guessed, by
-    the direction of the roots from the middle of the head, rather than by each of these readers in its own way.
+    Unreal and other groom readers know the `groom_*` primvars. If a groom has no root UVs, they are guessed here from the direction
+    of each root from the middle of the head; otherwise each reader would guess them in its own way.
     """
     curves = author_curves(stage, path, groom.points, groom.counts, groom.widths, spline)
     api = UsdGeom.PrimvarsAPI(curves)
@@ -136,7 +136,7 @@ def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = POLYLINE
 
 
 def _guessed_uv(groom: Groom) -> np.ndarray:
-    """Root UVs (S, 2) as the network reads them, about the middle of a head that is no further known."""
+    """Root UVs (S, 2) as the network reads them, around the estimated middle of an unknown head."""
     roots = np.zeros((groom.strand_count, 3), np.float32)
     filled = groom.counts > 0
     roots[filled] = groom.points[groom.starts[filled]]
@@ -147,7 +147,7 @@ def _guessed_uv(groom: Groom) -> np.ndarray:
 
 
 def _primvars(look: Look) -> tuple[Primvar, ...]:
-    """Colours as renderers and viewports know them."""
+    """Colours as primvars that renderers and viewports know."""
     names, found = Sdf.ValueTypeNames, []
     for name, kind, values, array in (
         ("displayColor", names.Color3fArray, look.color, Vt.Vec3fArray),
@@ -178,7 +178,7 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
 
 
 def _free_path(stage: Usd.Stage, name: str) -> str:
-    """A prim path below /Groom for a groom's name, which may be a file or a prim path."""
+    """An unused prim path below /Groom for a groom's name, which may be a file or a prim path."""
     base = Tf.MakeValidIdentifier(Path(name.rsplit("/", 1)[-1]).stem or "Hair")
     path, number = f"/Groom/{base}", 1
     while stage.GetPrimAtPath(path):

@@ -22,7 +22,7 @@ from ..shot.stage import read_rigs
 from .groom import write_groom
 
 _SEEN, _GROWN = 120, 930
-"""Thousandths of the work of many strands after which the head is looked at, and the hair grown."""
+"""Progress, in thousandths of the work for many strands, once the head is read and once the hair is grown."""
 
 
 def grow(
@@ -45,8 +45,8 @@ def grow(
         character: USD file with a skeleton and skinned meshes.
         out: USD file to write.
         count: strands, 1 to 150,000.
-        seed: the same one gives the same groom.
-        variation: number of a variation of the style: cut, parted, waved and laid otherwise; 0 is the style itself.
+        seed: the same seed gives the same groom.
+        variation: number of a variation of the style, cut, parted, waved and laid differently; 0 is the style itself.
         skeleton, head: as for `bake`.
         tell: called with notes for the user.
         progress: called with (done, total, message).
@@ -70,7 +70,7 @@ def grow(
 
 
 class Barber:
-    """Grows styles on one character; the head is looked at once."""
+    """Grows styles on one character; the head is read only once."""
 
     def __init__(self, character: Character):
         if character.body is None:
@@ -84,10 +84,10 @@ class Barber:
 
     @cached_property
     def _scalp(self) -> Scalp:
-        # Styles are grown facing +Z, around the head's own place.
+        # Styles are grown facing +Z, around the head's own position.
         centre = self.character.facing @ self.character.canonical_to_bind[:3, 3] + self.character.head_centre
         points, triangles = self.character.body.points @ self.character.facing.T, self.character.body.triangles
-        # Not on a hat.
+        # Hair does not grow on a hat.
         return from_head(points, triangles[self.character.skin[triangles[:, 0]]], centre)
 
     @cached_property

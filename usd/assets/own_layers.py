@@ -20,7 +20,7 @@ def is_own(path) -> bool:
 
 
 def character_of(path) -> str:
-    """Whose shot a file is, as its application calls the character; empty where that is not told."""
+    """The character whose shot a file is, by its name in the application; empty if the file does not say."""
     layer = _layer(path)
     prim = layer.GetPrimAtPath(ROOT) if layer else None
     return prim.GetInfo("displayName") if prim else ""
@@ -29,5 +29,5 @@ def character_of(path) -> str:
 def _layer(path) -> Sdf.Layer | None:
     try:
         return Sdf.Layer.OpenAsAnonymous(str(path))
-    except Tf.ErrorException:  # no USD file, or a damaged one
+    except Tf.ErrorException:  # not a USD file, or a damaged one
         return None

@@ -76,7 +76,7 @@ def bind_to(skeleton: UsdSkel.Skeleton, prim: Usd.Prim, bind_place: np.ndarray) 
 
 
 def bind_rigidly(skeleton: UsdSkel.Skeleton, prim: Usd.Prim, bind_place: np.ndarray, joint: int) -> UsdSkel.BindingAPI:
-    """`bind_to`, and all of the prim to one joint: of the skeleton's, or of those that the binding is given of its own."""
+    """`bind_to`, with the whole prim on one joint: of the skeleton, or of the binding's own joint list if it gets one."""
     binding = bind_to(skeleton, prim, bind_place)
     binding.CreateJointIndicesPrimvar(True, 1).Set([joint])
     binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
@@ -84,7 +84,7 @@ def bind_rigidly(skeleton: UsdSkel.Skeleton, prim: Usd.Prim, bind_place: np.ndar
 
 
 def author_influences(binding: UsdSkel.BindingAPI, indices: np.ndarray, weights: np.ndarray) -> None:
-    """Joint indices and weights (V, I) of a mesh's vertices."""
+    """Write joint indices and weights (V, I) of a mesh's vertices."""
     width = indices.shape[1]
     binding.CreateJointIndicesPrimvar(False, width).Set(integers(indices))
     binding.CreateJointWeightsPrimvar(False, width).Set(floats(weights))

@@ -114,7 +114,7 @@ def _author(stage: Usd.Stage, scene: SceneArrays) -> None:
     stage.SetStartTimeCode(float(scene.frames[0]))
     stage.SetEndTimeCode(float(scene.frames[-1]))
     root = UsdSkel.Root.Define(stage, ROOT)
-    root.GetPrim().SetCustomDataByKey(KEY, "shot")  # by which `own_layers` knows it
+    root.GetPrim().SetCustomDataByKey(KEY, "shot")  # `own_layers` recognises it by this
     if scene.name:
         root.GetPrim().SetDisplayName(scene.name)
     stage.SetDefaultPrim(root.GetPrim())

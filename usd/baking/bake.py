@@ -52,18 +52,18 @@ def bake(
         model: path of a strand model, or a StrandModel; the shipped one if left out.
         grooms: prim paths; all grooms if left out.
         skeleton: prim path of the skeleton; found if left out.
-        head: joint that carries grooms for which no binding says so.
+        head: joint that carries the grooms that no binding assigns to a joint.
         frames: `FIRST:LAST[:STEP]`, or time codes in any order; the shot's range if left out.
-        joints: semantic joint -> joint (path, or its last part), where names do not tell.
+        joints: semantic joint -> joint (path, or its last part), if names are not enough.
         subframes: samples per frame, for motion blur.
         material: a Material, or words NAME=VALUE.
         strength: motion strength from 0 (each pose as if held) to 4; 1 is as trained.
         resolve: push hair out of the body after the network.
-        loop: the clip repeats, its last sample shows the pose of its first: hair there remembers the end of the clip.
-        cuts: time codes from which a character is elsewhere and its hair starts anew; found by itself if None.
+        loop: the clip repeats, and its last sample shows the pose of its first: at the start, hair remembers the end of the clip.
+        cuts: time codes at which a character is suddenly elsewhere and its hair starts anew; detected if None.
         velocities: write velocities.
-        jobs: threads; a core each, eight at most, if left out.
-        tell: called with the notes that are known before hair is posed, then with the others.
+        jobs: threads; if left out, one per core, eight at most.
+        tell: called with the notes known before hair is posed, then with the others.
         progress: called with (done, total, message); raising from it stops the bake.
 
     Raises:
@@ -97,7 +97,7 @@ def bake(
 
 
 def as_material(material) -> Material:
-    """A Material from one, from words NAME=VALUE, or from a dict of them."""
+    """A Material from a Material, from words NAME=VALUE, or from a dict of them."""
     if isinstance(material, Material):
         return material
     if isinstance(material, dict):

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from ..shot.stage import StageGroom
 
 TOGETHER = 1 << 14
-"""Strands at most in several grooms that are posed together: what is kept for each strand does not grow with the shot."""
+"""Most strands in several grooms that are posed together, so that memory for per-strand data does not grow with the shot."""
 
 
 def batches(grooms: Sequence[StageGroom]) -> list[list[StageGroom]]:
-    """Grooms in their order, those of one head that follow each other together.
+    """Groups of grooms in their order: successive grooms of one head go together.
 
-    It depends on the grooms alone, not on what is asked of them: so every part of a bake has the same.
+    The groups depend on the grooms alone, not on what is baked of them, so every part of a bake has the same groups.
     """
     found: list[list[StageGroom]] = []
     strands = 0

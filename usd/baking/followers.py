@@ -6,16 +6,16 @@ import numpy as np
 from ..shot.curve_ends import Beyond
 
 SHORT = 0.01
-"""An edge shorter than this share of the way to the point tells no direction for it."""
+"""An edge shorter than this share of the distance to the point gives it no direction."""
 
 
 class Followers:
-    """Puts the drawn points of a groom, and with them those beyond their ends, among all of its points.
+    """Writes the drawn points of a groom, and the points beyond their ends that go with them, to the array of all its points.
 
     Args:
-        beyond: which points these are.
+        beyond: which points are beyond the ends.
         points: (P, 3) all points at rest in the prim's own space.
-        linear: (3, 3) from there to bind world [m].
+        linear: (3, 3) from that space to bind world [m].
     """
 
     def __init__(self, beyond: Beyond, points: np.ndarray, linear: np.ndarray):
@@ -25,7 +25,7 @@ class Followers:
         order = np.argsort(own)
         self._own, inward = own[order], inward[order]
         number = np.cumsum(beyond.hair) - 1
-        # The edge that each prolongs, in numbers of drawn points.
+        # The edge that each point extends, as indices of drawn points.
         self._near, self._far = number[self._own + inward], number[self._own + 2 * inward]
         near, far = points[self._own + inward].astype(float), points[self._own + 2 * inward].astype(float)
         self._offset, self._edge = _times(linear, points[self._own] - near), _times(linear, far - near)
@@ -34,11 +34,11 @@ class Followers:
         """Fill in the points of some consecutive strands.
 
         Args:
-            drawn: (n, 3) float32, their drawn points where they are placed.
-            first: number of the first of these among the drawn points.
-            linear: (3, 3) from bind world to where they are placed.
-            rest: (P, 3) float32 all points at rest there, if the groom stands where it rests: the bits of what is not
-                moved.
+            drawn: (n, 3) float32, the strands' drawn points, as placed.
+            first: index of the first one among all drawn points.
+            linear: (3, 3) from bind world to the space they are placed in.
+            rest: (P, 3) float32 all points at rest in that space, if the groom stands where it rests: unmoved points keep their
+                exact bits.
             into: (P, 3) float32 all points.
         """
         into[self._hair[first : first + len(drawn)]] = drawn
@@ -53,9 +53,9 @@ class Followers:
 
 
 def _turned(vectors: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Vectors (n, 3) turned as edges `before` turn to `after` by the smallest rotation; as they are where an edge is short.
+    """Vectors (n, 3) turned as edges `before` turn to `after` by the smallest rotation; unchanged where an edge is short.
 
-    Written out: the result for one must not depend on how many there are.
+    Written out term by term: the result for one vector must not depend on how many there are.
     """
     length = _length(vectors)
     told = (np.minimum(_length(before), _length(after)) > SHORT * length) & (length > 0)

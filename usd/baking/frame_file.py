@@ -9,11 +9,11 @@ import numpy as np
 from neuralocks_core.files import put_in_place
 
 _BLOCK = 1 << 16
-"""Words whose sum is taken at a time: half a megabyte stays in a core's cache."""
+"""Words summed at a time: half a megabyte fits in a core's cache."""
 
 
 def write_frame(path: Path, points: np.ndarray, spare: Path | None = None) -> None:
-    """Write points (P, 3) at once under the final name, over a spare file where one is given. Raises OSError."""
+    """Write points (P, 3) and then give the file its final name; reuses a spare file if one is given. Raises OSError."""
     numbers = np.ascontiguousarray(points, np.float32).reshape(-1)
     even = len(numbers) // 2 * 2
     odd = np.zeros(2 * (len(numbers) - even), np.float32)
@@ -30,9 +30,7 @@ def write_frame(path: Path, points: np.ndarray, spare: Path | None = None) -> No
 
 
 def read_rows(path: Path, first: int, into: np.ndarray) -> None:
-    """Points from the `first` on, as many as fill `into` (n, 3) float32, one piece of memory. Raises OSError, or ValueError where
-    they are fewer.
-    """
+    """Fill `into`, (n, 3) float32 and contiguous, with points from the `first` on. Raises OSError, or ValueError if too few."""
     with open(path, "rb", buffering=0) as file:
         file.seek(12 * first)
         if file.readinto(into.reshape(-1).data) < into.nbytes:
@@ -40,7 +38,7 @@ def read_rows(path: Path, first: int, into: np.ndarray) -> None:
 
 
 def has_size(path: Path, points: int) -> bool:
-    """Whether a file is as long as a frame of so many points."""
+    """Whether a file is as long as a frame with this many points."""
     try:
         return path.stat().st_size == 12 * points + 4 * (points % 2) + 8
     except OSError:
@@ -60,5 +58,5 @@ def is_whole(path: Path) -> bool:
 
 
 def _checksum(total: int) -> np.ndarray:
-    """(1,) uint64: the sum of the words before it, which takes a twentieth of a CRC's time; plus one, or zeros would do."""
+    """(1,) uint64: the sum of the words before it, in a twentieth of a CRC's time; plus one, or all zeros would pass."""
     return np.array([(total + 1) % (1 << 64)], np.uint64)

@@ -12,11 +12,11 @@ from neuralocks_core.errors import NeuralocksError
 from ..border.units import Border
 
 LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation", "owner", "sessionOwner"}
-"""Metadata that is said of one layer, or that USD reads of sublayers, too."""
+"""Metadata of a single layer, or that USD also reads from sublayers."""
 
 
 def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path, out: Path, codes: list[float]) -> None:
-    """Sublayer the shot by a path relative to `out`, and repeat what USD reads of a stage's first layer only."""
+    """Sublayer the shot by a path relative to `out`, and repeat what USD reads from a stage's first layer only."""
     ranged = stage.HasAuthoredTimeCodeRange()
     facts = {
         "metersPerUnit": border.metres_per_unit,
@@ -26,19 +26,17 @@ def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path,
         "startTimeCode": stage.GetStartTimeCode() if ranged else codes[0],
         "endTimeCode": stage.GetEndTimeCode() if ranged else codes[-1],
     }
-    if not stage.GetDefaultPrim():  # else it is repeated as the shot has it, which may be a path
+    if not stage.GetDefaultPrim():  # otherwise it is repeated as the shot has it, which may be a path
         facts["defaultPrim"] = next(iter(stage.GetPseudoRoot().GetChildren())).GetName()
     repeat_metadata(stage.GetRootLayer(), layer, out, facts)
     layer.subLayerPaths.append(relative(shot, out))
 
 
 def repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path, facts: dict) -> None:
-    """Units, rates, range, default prim, render settings, and the variables without which references find nothing; with
-    `facts` in place of what is said otherwise.
-    """
+    """Copy units, rates, range, default prim, render settings and the variables that references need; `facts` override them."""
     root = source.pseudoRoot
     said = {name: root.GetInfo(name) for name in root.ListInfoKeys() if name not in LAYERS_OWN}
-    for name, value in sorted((said | facts).items()):  # USD gives another order in each process
+    for name, value in sorted((said | facts).items()):  # USD's own order differs between processes
         layer.pseudoRoot.SetInfo(name, value)
 
     def placed(asset: str) -> str:
@@ -48,10 +46,10 @@ def repeat_metadata(source: Sdf.Layer, layer: Sdf.Layer, out: Path, facts: dict)
 
 
 def relative(file, out: Path) -> str:
-    """Path of a file relative to a layer's folder, by the names it was given.
+    """Path of a file relative to a layer's folder, by the names given: links stay links.
 
-    What a shot refers to is found from its own folder, not from where a link in its path leads. Where the
-    folder's own path has a link, `..` must lead to the file both from there and from behind the link.
+    USD resolves a shot's references from the shot's own folder, not from where a link in its path leads. If the folder's own path
+    contains a link, `..` must lead to the file both from the link and from its target.
     """
     if any(unicodedata.category(letter) == "Cc" for letter in str(file)):
         raise NeuralocksError(
@@ -83,13 +81,13 @@ def over_prim(layer: Sdf.Layer, prim: Usd.Prim) -> Sdf.PrimSpec:
 
 
 def apply_binding(over: Sdf.PrimSpec, prim: Usd.Prim) -> None:
-    """Apply SkelBindingAPI to an over, where its prim has it not."""
+    """Apply SkelBindingAPI to an over whose prim does not have it."""
     if not prim.HasAPI("SkelBindingAPI"):
         over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["SkelBindingAPI"]))
 
 
 def _same(path: str, file) -> bool:
-    """Whether a path, read as USD does, without a look at links before `..`, is the file."""
+    """Whether a path is the file, read as USD reads it, without resolving links before `..`."""
     try:
         return os.path.samefile(os.path.normpath(path), file)
     except OSError:

@@ -48,20 +48,20 @@ class JoinResult:
 
 
 def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
-    """Write one bake out of several of the same shot, byte for byte what a bake of all their frames and grooms is.
+    """Write one bake from several of the same shot, byte for byte the same as one bake of all their frames and grooms.
 
-    Parts may be of other frames, of other grooms, or both; those of one head that are not baked together come out the same
-    but for rounding. Memory does not grow with the number of frames; parts in text, `.usda`, lie in it whole.
+    Parts may differ in frames, in grooms, or in both. Grooms of one head that were not baked together come out the same except for
+    rounding. Memory does not grow with the number of frames, but text parts, `.usda`, are loaded whole.
 
     Args:
-        parts: files that `bake` or `simulate` wrote, in any order, or a lone one. Of a groom's frames that several have the
-            first file's count.
+        parts: files that `bake` or `simulate` wrote, in any order, or a single one. If several have the same frame of a groom, the
+            first file's counts.
         out: `.usdc`, `.usd` or `.usda` to write.
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: a part is no bake, or of another shot than the first, or has a groom with other options than
-            another part. Nothing is left under the output's name.
+        NeuralocksError: a part is not a bake, is of a different shot than the first, or has a groom that another part baked with
+            other options. Nothing is left under the output's name.
     """
     out = as_path(out, "out")
     check_layer_name(out)
@@ -140,7 +140,7 @@ class _Part:
             raise NeuralocksError(f"{self.path}: cannot be read ({first_line(error)}); bake that part again") from None
 
     def _is_baked(self, prim: Sdf.PrimSpec) -> bool:
-        # On what is no groom, the key tells in a word what else was written here.
+        # On a prim that is not a groom, the key holds one word instead: what else this program wrote there.
         return isinstance(prim.customData.get(KEY), dict) and bool(self.codes(prim.path))
 
     def codes(self, groom: Sdf.Path) -> list[float]:
@@ -148,7 +148,7 @@ class _Part:
         return list(self.layer.ListTimeSamplesForPath(groom.AppendProperty("points")))
 
     def value(self, groom: Sdf.Path, code: float, name: str, count: int | None = None) -> Vt.Vec3fArray:
-        """The array of an attribute's sample; of `count` vectors, where that is known.
+        """The array of an attribute's sample; of `count` vectors, if that is known.
 
         Raises:
             NeuralocksError: it is missing, or damaged.
@@ -174,14 +174,14 @@ class _Part:
         return self.layer.GetNumTimeSamplesForPath(groom.AppendProperty(name)) > 0
 
     def made(self, groom: Sdf.Path) -> dict:
-        """With what a groom was baked."""
+        """The options that a groom was baked with."""
         codes = self.codes(groom)
         count = len(self.value(groom, codes[0], "points"))
         options = {"velocities": self.samples_of(groom, "velocities"), "number of points": count}
         return self.layer.GetPrimAtPath(groom).customData[KEY] | options
 
     def check_alike(self, others: list["_Part"]) -> None:
-        """Refuse what does not find its shot, is of another one than other parts, or has a groom of theirs with other options."""
+        """Refuse a part that cannot find its shot, has another shot than the others, or has a groom of theirs with other options."""
         for shot in self._shots():
             if not Ar.GetResolver().Resolve(shot):
                 raise NeuralocksError(
@@ -220,7 +220,7 @@ def _sources(groom: Sdf.Path, parts: list[_Part]) -> dict[float, _Part]:
 
 
 def _copy_header(source: Sdf.Layer, target: Sdf.Layer, out: Path, parts: list[_Part]) -> None:
-    """What a part says of the stage, and the range of all parts, where the shot has none of its own."""
+    """Copy a part's stage metadata, with the range of all parts if the shot has none of its own."""
     begin, end = min(part.layer.startTimeCode for part in parts), max(part.layer.endTimeCode for part in parts)
     repeat_metadata(source, target, out, {"startTimeCode": begin, "endTimeCode": end})
     for shot in source.subLayerPaths:
@@ -228,7 +228,7 @@ def _copy_header(source: Sdf.Layer, target: Sdf.Layer, out: Path, parts: list[_P
 
 
 def _copy_prim(prim: Sdf.PrimSpec, target: Sdf.Layer) -> None:
-    """All that a part says of a prim but samples."""
+    """Copy everything that a part says about a prim, except samples."""
     over = Sdf.CreatePrimInLayer(target, prim.path)
     _copy_info(prim, over)
     for relation in prim.relationships:
@@ -241,13 +241,13 @@ def _copy_prim(prim: Sdf.PrimSpec, target: Sdf.Layer) -> None:
 
 
 def _copy_info(source: Sdf.Spec, target: Sdf.Spec, without=()) -> None:
-    for name in sorted(source.ListInfoKeys()):  # USD gives another order in each process
+    for name in sorted(source.ListInfoKeys()):  # USD's own order differs between processes
         if name not in without:
             target.SetInfo(name, source.GetInfo(name))
 
 
 def _copy_samples(groom: Sdf.Path, sources: dict[float, _Part], file: SampleLayer, frame: float) -> Iterator[float]:
-    """Samples of a groom; yields the time codes of the points as they are copied."""
+    """Copy the samples of a groom; yields the time codes of the points as they are copied."""
     code, part = next(iter(sources.items()))
     count = len(part.value(groom, code, "points"))
     counts = {"extent": 2, "points": count, "velocities": count}
@@ -269,7 +269,7 @@ def _below(prim: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
 
 
 def _prims(parts: list[_Part], stage: Usd.Stage) -> list[Sdf.PrimSpec]:
-    """All prims of parts in the order in which a bake writes them, that of the stage; each from the first part that has it."""
+    """All prims of the parts in the order in which a bake writes them, the stage's; each from the first part that has it."""
     found: dict[Sdf.Path, Sdf.PrimSpec] = {}
     for part in parts:
         for prim in part.prims():
@@ -280,7 +280,7 @@ def _prims(parts: list[_Part], stage: Usd.Stage) -> list[Sdf.PrimSpec]:
 
 
 def _all_gaps(plan: dict[Sdf.Path, dict[float, _Part]], frame: float, stage: Usd.Stage) -> list[str]:
-    """The notes on frames of the shot that no part has; of each groom where they are not the same."""
+    """The notes on frames of the shot that no part has; one per groom if they differ."""
     found = {groom: _gaps(list(sources), frame, stage) for groom, sources in plan.items()}
     if len({tuple(sources) for sources in plan.values()}) == 1:
         return next(iter(found.values()))

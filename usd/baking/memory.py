@@ -7,25 +7,25 @@ from contextlib import contextmanager
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of malloc.h
 SMALL, LARGE = 1 << 20, 32 << 20
-"""Arrays of at least so many bytes are mapped one by one, and go back to the system when they are freed: SMALL while
+"""Arrays of at least this many bytes are mapped one by one, and go back to the system when they are freed: SMALL while
 something large is prepared; LARGE otherwise, because mapping arrays makes frames a third slower.
 """
 
 
 @contextmanager
 def preparing() -> Iterator[None]:
-    """While something large is prepared: all that it needs besides its result is given back at the end."""
+    """For preparing something large: at the end, all memory except the result's is given back."""
     _tell("mallopt", _MMAP_THRESHOLD, SMALL)
     try:
         yield
     finally:
         _tell("mallopt", _MMAP_THRESHOLD, LARGE)
-        _tell("mallopt", _TRIM_THRESHOLD, 2 * LARGE)  # as it would have grown by itself
+        _tell("mallopt", _TRIM_THRESHOLD, 2 * LARGE)  # as malloc would have raised it by itself
         give_back()
 
 
 def give_back() -> None:
-    """Return what is free by now; what is needed again later is mapped anew, which takes time, too."""
+    """Return memory that is free by now; it takes time to map it again when it is needed."""
     _tell("malloc_trim", 0)
 
 

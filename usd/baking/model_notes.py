@@ -24,10 +24,10 @@ def learned(model: StrandModel, shot: Shot) -> list[str]:
 
 
 def _unheard(model: StrandModel, material: Material) -> list[str]:
-    """The note on constants that are not as in the one material that a model was trained with."""
+    """The note on constants that differ from the only material that a model was trained with."""
     options = model.meta["training"].get("options")
     varied = options.get("random_materials", True) if isinstance(options, dict) else True
-    plain = replace(material, clumping=Material.clumping)  # whose effect no network learns
+    plain = replace(material, clumping=Material.clumping)  # no network learns its effect
     if varied or plain == Material():
         return []
     return [
@@ -37,9 +37,9 @@ def _unheard(model: StrandModel, material: Material) -> list[str]:
 
 
 def _other_bodies(model: StrandModel, shot: Shot) -> list[str]:
-    """The notes on characters of other measures than those that a model was trained on."""
+    """The notes on characters whose measures differ from those that a model was trained on."""
     found = [item.attachment for item in shot.grooms]
-    on_heads = {each.rig.path: each for each in found if not off_head(each)}  # a chest has not a head's measures
+    on_heads = {each.rig.path: each for each in found if not off_head(each)}  # a chest does not have a head's measures
     told = {path: model.another_body(each.character, each.rig.clip) for path, each in on_heads.items()}
     return [
         f"{path}: the model was trained on another body: {fact}; if hair moves oddly or lies in the body, use the shipped model, "

@@ -27,7 +27,7 @@ from .spool import Spool
 class OverrideWriter:
     """Writes samples, in the order they come, to a crate file.
 
-    What the file holds depends on nothing but the shot and the samples: no date, no machine, no timing.
+    The file's content depends only on the shot and the samples, not on date, machine or timing.
 
     Args:
         file: to write to.
@@ -44,13 +44,13 @@ class OverrideWriter:
                 write_header(file.layer, shot.stage, shot.border, shot.path, out, codes)
 
     def groom(self, item: StageGroom, velocities: bool, facts: dict) -> None:
-        """Open a groom: the overs, what it is made with, and what keeps it from being skinned a second time."""
+        """Begin a groom: write the overs, how it was made, and what keeps it from being skinned a second time."""
         layer, path = self._file.layer, item.prim.GetPath()
         self._reach[path] = max(
             np.float32(item.groom.widths.max() / 2 / _unit(item)), np.float32(widest_sample(item.prim) / 2)
         )
         if layer.GetAttributeAtPath(path.AppendProperty("points")):
-            return  # by the bake that this one goes on with
+            return  # done by the bake that this one resumes
         over = over_prim(layer, item.prim)
         record(over, {**facts, "joint": item.joint, INPUTS: made_from(item.attachment, item.groom)})
         if item.attachment.skinned:
@@ -64,9 +64,9 @@ class OverrideWriter:
         Sdf.AttributeSpec(over, "extent", names.Float3Array)
         points = Sdf.AttributeSpec(over, "points", names.Point3fArray)
         if UsdGeom.BasisCurves(item.prim).GetPointsAttr().Get(Usd.TimeCode.Default()) is None:
-            # Else the first baked sample would be the shape at rest to whoever reads the bake.
+            # Otherwise readers of the bake would take its first sample as the rest shape.
             points.default = vectors(_at_default(item))
-        # What the shot says of motion is not that of these points: a renderer would blur by it.
+        # The shot's own values do not fit the baked points: a renderer would blur by them.
         authored = {name for name in ("velocities", "accelerations") if item.prim.GetAttribute(name).HasAuthoredValue()}
         if velocities:
             Sdf.AttributeSpec(over, "velocities", names.Vector3fArray)
@@ -83,8 +83,8 @@ class OverrideWriter:
             item: the groom.
             time_code: when.
             name: "points" or "velocities".
-            fill: puts all P values into an array (P, 3) float32, and yields consecutive parts of it as they are there: a
-                large groom's are in memory once.
+            fill: writes all P values to an array (P, 3) float32 and yields consecutive parts as they are ready, so that a large
+                groom is in memory only once.
         """
         array, corners = Vt.Vec3fArray(item.point_count), []
         for part in fill(np.asarray(_Writable(array))):
@@ -103,7 +103,7 @@ class OverrideWriter:
 
 
 def deliver(spool: Spool) -> None:
-    """Put an assembled layer under its final name, as text where that asks for it; stages that this process has open see it."""
+    """Move an assembled layer to its final name, as text if the name asks for it; stages open in this process see it."""
     check()
     if spool.out.suffix.lower() == ".usda":
         text = spool.layer_path.with_suffix(".usda")
@@ -115,12 +115,12 @@ def deliver(spool: Spool) -> None:
 
 
 class _Writable:
-    """A new USD array as numpy may fill it. USD itself lets its arrays be read only, and to convert and copy what goes into
-    them costs more than to write them.
+    """A new USD array that numpy can fill. USD itself only lets its arrays be read, and converting and copying data into them takes
+    longer than writing it.
     """
 
     def __init__(self, array: Vt.Vec3fArray):
-        self._array = array  # lives as long as what numpy makes of this
+        self._array = array  # lives as long as numpy's view of this
         facts = np.asarray(array).__array_interface__
         self.__array_interface__ = {**facts, "data": (facts["data"][0], False)}
 

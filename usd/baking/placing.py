@@ -21,7 +21,7 @@ BLOCK = 512
 """Strands placed at a time, as many as the runtime infers at a time."""
 
 PART = 32 * BLOCK
-"""Strands prepared at a time: what that needs besides its result does not grow with the groom."""
+"""Strands prepared at a time, so that temporary memory does not grow with the groom."""
 
 STILL = 1e-6
 """A groom moved by less than this [m] has not moved: its points are then written bit for bit."""
@@ -34,8 +34,8 @@ class GroomPlacer:
         item: the groom.
         strands: as the network sees it.
         carriers: one for every PART strands.
-        ends: (S + 1,) first drawn point of each strand, and the number of all.
-        followers: what takes along the points that are not drawn, if there are any.
+        ends: (S + 1,) index of the first drawn point of each strand, and at the end the number of all.
+        followers: moves the points that are not drawn, if there are any.
         same_size: whether every strand has as many points as the network gives it.
         centre: (3,) [m], the head's own place in bind world.
     """
@@ -61,8 +61,8 @@ class GroomPlacer:
 
         Args:
             time_code: when.
-            joints: (J, 4, 4) world joint transforms [m] there.
-            into: (P, 3) float32 that the points are put into; made if left out.
+            joints: (J, 4, 4) world joint transforms [m] at that time.
+            into: array for the points, (P, 3) float32; made if left out.
         """
         item = self.item
         to_prim = inverse(item.attachment.rig.border.to_core @ item.placement.at(time_code))

@@ -22,7 +22,7 @@ class GroomPoser:
     """Deforms grooms of a shot with a model.
 
     Args:
-        items: grooms of one head, which share the work that its body and its motion make.
+        items: grooms of one head, which share the work for its body and motion.
         model: the strand model; its threads share the work, and the result does not depend on them.
         material: what the hair is made of.
         strength: motion strength; 0 is the held pose.
@@ -75,7 +75,7 @@ class GroomPoser:
             self._session.each(self._vector(time_code, joints), placed.put)
             return placed.points
         moved = self._displacement(time_code, joints)
-        # Each chunk's points take the place of its displacement where they are as many.
+        # A chunk's points overwrite its displacement if there are as many of them.
         in_place = all(placer.same_size for placer in self._placers)
         ends = np.cumsum([0, *(placer.item.point_count for placer in self._placers)])
         points = moved.reshape(-1, 3) if in_place else np.empty((ends[-1], 3), np.float32)
@@ -94,7 +94,7 @@ class GroomPoser:
         shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
         self._skin.carry(moved, shape, lambda moved: self._push(moved, joints, shape))
         if self._resolvers and moved.nbytes > LARGE:
-            give_back()  # 20 MB, for a few hundredths of the time: this frame will be written beside the next one
+            give_back()  # 20 MB for a few percent of the time: this frame is written while the next one is posed
         return moved
 
     def _push(self, moved: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> None:
@@ -102,11 +102,11 @@ class GroomPoser:
         for rows, resolver in self._resolvers:
             part = moved[rows]
             resolver.apply(part, joints, shape, self._model.map)
-            if not isinstance(rows, slice):  # else it is a view
+            if not isinstance(rows, slice):  # a slice gives a view
                 moved[rows] = part
 
     def _alike(self) -> list[slice | np.ndarray]:
-        """Strands of grooms with the same part of the body in their reach: each groom is moved as if it were alone."""
+        """Strands grouped by the part of the body in their groom's reach: each groom is moved as if it were alone."""
         found: dict[float, list] = {}
         for placer, rows in zip(self._placers, self._rows):
             far = reach(placer.item.attachment.character, placer.strands)

@@ -20,7 +20,7 @@ class BakeResult:
 
     Attributes:
         path: the override layer.
-        frames: its time codes.
+        frames: time codes in the layer.
         grooms: per groom: path, strands, points, joint, how the joint was found.
         notes: what a user should know.
         seconds: wall time.
@@ -38,14 +38,14 @@ class BakeResult:
 def read_asked(
     shot, grooms, skeleton, head, joints, cuts, frames, subframes: int, progress: Progress | None
 ) -> tuple[Shot, list[float]]:
-    """The shot, read where it is not yet, and the time codes that are asked for; arguments as for `bake`."""
-    (progress or silent)(0, 1, "reading the shot")  # of a crowd that takes longer than a user waits without a word
+    """The shot, read if it is not yet, and the time codes asked for; arguments as for `bake`."""
+    (progress or silent)(0, 1, "reading the shot")  # for a crowd, this takes longer than a user waits without a message
     shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
     return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
 
 
 def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[str]:
-    """What a user should know before hair is posed at time codes, with where it starts anew if `cuts`."""
+    """Notes for the user before hair is posed at time codes; with `cuts`, also on where it starts anew."""
     return [
         *shot.notes,
         *asked_notes(shot.stage, shot.rigs, codes, loop),
@@ -57,10 +57,10 @@ def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[
 def write_told(
     notes: list[str], tell: Callable[[list[str]], None] | None, began: float, shot: Shot, out: Path, codes, *what, **how
 ) -> BakeResult:
-    """Tell the notes, write the samples, then tell what is wrong with where they lie.
+    """Tell the notes, write the samples, then tell what is wrong with the output's folder.
 
     Args:
-        notes: known before.
+        notes: those known before.
         tell: as for `bake`.
         began: on the clock of `time.monotonic`.
         shot, out, codes, what, how: as for `write_samples`.

@@ -17,18 +17,18 @@ SAVE_EVERY = 32 << 20
 
 
 class SampleLayer:
-    """A layer with time samples of arrays of vectors, which are saved now and then.
+    """A layer with time samples of arrays of vectors, saved from time to time.
 
-    When depends on nothing but the samples: so a file is the same, whether it was written at once or gone on with.
+    When it saves depends only on the samples, so the file is the same whether it was written in one go or resumed.
 
     Args:
         part: file to write now.
-        out: its final name, which errors tell.
-        log: of the file, which makes it one to go on with; none if left out.
+        out: its final name, for error messages.
+        log: of the file, which makes it resumable; none if left out.
         puts: how many samples are in it already; 0 writes a new file.
 
     Attributes:
-        layer: for all that is no sample.
+        layer: for everything except samples.
         saved: how many samples are in the file and its log.
     """
 
@@ -76,15 +76,14 @@ class SampleLayer:
 
 
 def in_order(codes: Sequence[float], frame: float, velocities: bool = True) -> Iterator[tuple[str, float]]:
-    """The order in which a groom's samples come: the velocity of a time code after the points of the two frames that
-    follow it, which it is made of where they are computed at all.
+    """The order in which a groom's samples come: a velocity comes after the points of the next two frames, if those are baked.
 
-    A file is thus the same whether it was baked at once or joined of parts.
+    So a file is the same whether it was baked in one go or joined from parts.
 
     Args:
         codes: ascending time codes.
         frame: time codes from one frame to the next.
-        velocities: whether there are any.
+        velocities: whether there are any. They are computed from the points of neighbouring frames.
 
     Yields:
         "points" or "velocities", and the time code.

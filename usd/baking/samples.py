@@ -40,7 +40,7 @@ BLOCK = 1 << 16
 
 
 class Poser(Protocol):
-    """What gives the points of grooms."""
+    """Computes the points of grooms."""
 
     def points(self, time_code: float) -> np.ndarray:
         """(P, 3) float32 of all grooms, one after the other, each in its prim's own space and units."""
@@ -66,8 +66,8 @@ def write_samples(
         out: `.usdc`, `.usd` or `.usda`.
         codes: ascending time codes.
         poser: makes the poser of grooms; called only if something is left to compute.
-        inputs: plain values that, with the shot, its files and this program's, determine every sample.
-        facts: what the file tells of how it was made, see `recorded`.
+        inputs: plain values that, together with the shot, its files and this program's files, determine every sample.
+        facts: what the file records about how it was made, see `recorded`.
         together: pose the grooms of a head together, not each alone.
         velocities: write velocities.
         progress: called with (done, total, message).
@@ -76,8 +76,8 @@ def write_samples(
         Frames taken over from an interrupted bake of the same inputs, counted for each groom.
 
     Raises:
-        NeuralocksError: it cannot be made. Nothing is left then, neither under its name nor beside it; only a stop by the user, or
-            a file system that refuses, as of a full disk (CannotWrite), leaves the finished frames, to go on from.
+        NeuralocksError: it cannot be made. Then nothing is left under its name or beside it. Only a stop by the user or an error of
+            the file system, such as a full disk (CannotWrite), leaves the finished frames, to resume from.
     """
     check_not_over(out, shot.stage)
     inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
@@ -90,7 +90,7 @@ def write_samples(
         if isinstance(error, KeyboardInterrupt | CannotWrite) or stopped():
             spool.close()
         else:
-            # These frames hold the layer, and Windows removes no file that is shown.
+            # These stack frames hold the layer, and Windows does not remove a file that is mapped.
             traceback.clear_frames(error.__traceback__)
             spool.discard()
         raise
@@ -135,8 +135,8 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
                 else:
                     if made is None:
                         made = poser(items)
-                        say(done, total, items[0].path)  # the time left is reckoned from here on
-                    # At once: points that waited for it would lie in memory beside those of the next frame.
+                        say(done, total, items[0].path)  # the time left is estimated from here on
+                    # Write them now: waiting points would be in memory together with those of the next frame.
                     spool.write(number, code, made.points(code))
                 behind.put(stores[0].put, code, forget)
                 done += len(items)
@@ -151,8 +151,8 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
 
 
 def _plan(shot: Shot, out: Path, codes: list[float], facts: dict) -> str:
-    """Digest of what a layer says beside its samples, and of their time codes: a folder that was moved has another way to the
-    shot, and options that change no sample are told, too.
+    """Digest of a layer's content besides its samples, and of their time codes. A moved folder changes it, because the path to the
+    shot changes, and so do recorded options that change no sample.
     """
     header = Sdf.Layer.CreateAnonymous()
     with named(out):
@@ -161,14 +161,14 @@ def _plan(shot: Shot, out: Path, codes: list[float], facts: dict) -> str:
 
 
 class _Store:
-    """Writes one groom's samples as the frames that they are made of come.
+    """Writes one groom's samples as the frames that they need become available.
 
     Args:
-        spool, writer: from where, to where.
+        spool, writer: where to read and where to write.
         item: the groom.
         plan: which samples.
         number: its batch.
-        first: its first point among those of the batch.
+        first: index of its first point in the batch.
         there: how many samples need not be written.
     """
 
@@ -187,11 +187,11 @@ class _Store:
         self._left = deque(plan.puts[there:])
 
     def open(self, velocities: bool, facts: dict) -> None:
-        """Before the first frame."""
+        """Begin the groom, before the first frame."""
         self._writer.groom(self.item, velocities, facts)
 
     def put(self, code: float, done: Callable[[], None]) -> None:
-        """Write the samples that need no frame after `code`, which are in the spool; `done` is called after each."""
+        """Write the samples that need no frame after `code`, from frames in the spool; `done` is called after each."""
         while self._left and max(self._left[0][2], default=code) <= code:
             name, at, _ = self._left.popleft()
             self._writer.sample(
@@ -200,12 +200,12 @@ class _Store:
             done()
 
     def whole(self, velocities: bool, facts: dict, done: Callable[[], None]) -> None:
-        """All of it, where all frames are in the spool."""
+        """Write the whole groom, once all frames are in the spool."""
         self.open(velocities, facts)
         self.put(math.inf, done)
 
     def _blocks(self, into: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-        """Parts (n, 3) of an array for all points of the groom, each with its first point's number in the batch."""
+        """Parts (n, 3) of an array for all points of the groom, each with the index of its first point in the batch."""
         for low in range(0, len(into), BLOCK):
             yield self._first + low, into[low : low + BLOCK]
 
@@ -216,7 +216,7 @@ class _Store:
             yield part
 
     def _velocities(self, code: float, into: np.ndarray) -> Iterator[np.ndarray]:
-        """The same in units of the prim per second."""
+        """The same for velocities, in units of the prim per second."""
         (base_code, _), *terms = self._plan.terms(code) or [(code, 0.0)]
         base, other = np.empty((2, min(BLOCK, len(into)), 3), np.float32)
         for first, part in self._blocks(into):
@@ -226,7 +226,7 @@ class _Store:
                 self._spool.read(self._number, base_code, first, here)
             for term_code, weight in terms:
                 self._spool.read(self._number, term_code, first, term)
-                # The weights add up to nothing: of differences, hair that stands still has no velocity by rounding.
+                # The weights sum to zero. With differences, hair that stands still gets no velocity from rounding.
                 term -= here
                 term *= np.float32(weight)
                 part += term
@@ -234,11 +234,11 @@ class _Store:
 
 
 def _check_space(spool: Spool, batched: list, codes: list[float], velocities: bool) -> None:
-    """Refuse a bake for which the disk has no room, beside the frames that are there already, to go on from."""
+    """Refuse a bake that does not fit on the disk, given the finished frames that are already there to resume from."""
     size, left = 0.0, spool.size()
     for items in batched:
         frame = 12 * sum(item.point_count for item in items)
-        # Frames stay until a save, of what velocities are made of up to two frames later; or until another groom's turn.
+        # Frames stay until a save, and those that velocities need up to two frames longer; or until another groom's turn.
         near = 5 * items[0].attachment.rig.border.frame
         waiting = SAVE_EVERY / frame + max(bisect_right(codes, code + near) - place for place, code in enumerate(codes))
         kept = min(waiting, len(codes)) if len(items) == 1 else len(codes)

@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 
 HEADER = 88
-"""Bytes of a crate file's header; the place of its table of contents stands in it."""
+"""Bytes of a crate file's header, which holds the offset of the table of contents."""
 
 _PAGE = 1 << 12
 _ALIGNED = 1 << 16
-"""What is mapped begins at a multiple of so many bytes, as Windows asks for."""
+"""Mappings begin at a multiple of this many bytes, as Windows requires."""
 _WINDOW = 1 << 23
 """Bytes that are mapped at a time: they count as memory of the process."""
 
@@ -33,16 +33,16 @@ _BYTES = "header", "tables"
 
 @dataclass(frozen=True)
 class _Save:
-    """What a line tells.
+    """The content of a line.
 
     Attributes:
-        puts: how often something was put into the file until then.
-        spent: how many frames nothing after it needs any more.
+        puts: how often something had been put into the file by then.
+        spent: how many frames are no longer needed after it.
         header: the file's first bytes.
         end: where the values end and the tables begin.
         tables: the rest of the file.
         begin: where the values of this save begin.
-        trace: checksum of these.
+        trace: checksum of these values.
     """
 
     puts: int
@@ -59,8 +59,8 @@ class SaveLog:
 
     Args:
         path: the log's own file.
-        plan: what the file will hold, in a word; a log of another plan does not count.
-        spent: ascending, for each frame how many puts there are once nothing needs it any more.
+        plan: what the file will hold, as one word; a log of another plan is ignored.
+        spent: ascending; for each frame, the number of puts after which nothing needs it.
     """
 
     def __init__(self, path: Path, plan: str, spent: Sequence[int]):
@@ -70,13 +70,11 @@ class SaveLog:
     def begin(self) -> None:
         """Start anew. Raises OSError."""
         self._end = HEADER
-        self._path.unlink(missing_ok=True)  # a hard link's other name keeps what it has
+        self._path.unlink(missing_ok=True)  # other hard links to the file keep their content
         self._path.write_text(_line({"plan": self._plan}))
 
     def add(self, file: Path, puts: int) -> bool:
-        """Note what a file is like after a save; False where it is none that this knows, as one of a later USD may be. Raises
-        OSError.
-        """
+        """Record a file's state after a save; False if its format is unknown, such as a later USD's. Raises OSError."""
         try:
             header, end, tables = _tables(file)
         except (ValueError, struct.error):
@@ -91,7 +89,7 @@ class SaveLog:
         """Take a file back to its last save whose values are all there, and forget the later ones.
 
         Returns:
-            How often something was put into it until then; 0 if there is nothing to go on from.
+            How often something had been put into it by then; 0 if there is nothing to resume from.
 
         Raises:
             OSError: it cannot be read or written.
@@ -122,13 +120,13 @@ class SaveLog:
 
 
 def spent_frames(path: Path) -> int:
-    """How many frames a log knows to be all used."""
+    """How many frames are used up, according to a log."""
     saves = [_save(line) for line in _lines(path)[1:]]
     return saves[-1].spent if saves and saves[-1] else 0
 
 
 def _tables(file: Path) -> tuple[bytes, int, bytes]:
-    """Header of a crate file, where its tables begin, and these. Raises ValueError or struct.error if it is none."""
+    """Header of a crate file, where its tables begin, and the tables. Raises ValueError or struct.error if it is not one."""
     with open(file, "rb") as crate:
         header = crate.read(HEADER)
         if len(header) < HEADER or not header.startswith(b"PXR-USDC"):
@@ -142,9 +140,9 @@ def _tables(file: Path) -> tuple[bytes, int, bytes]:
 
 
 def _trace(file: Path, begin: int, end: int) -> int | None:
-    """Checksum of what lies from `begin` to before `end`: of the sum of each page's words, because a power cut loses whole
-    pages, and no word of a page is always other than zero; and of all in the first page, which was written before. None if
-    the file is shorter.
+    """Checksum of the bytes from `begin` to before `end`; None if the file is shorter. It covers the sum of each page's words,
+    because a power cut loses whole pages and no single word of a page is sure to be nonzero; and all of the first page, which was
+    written before.
     """
     if file.stat().st_size < end:
         return None
@@ -157,7 +155,7 @@ def _trace(file: Path, begin: int, end: int) -> int | None:
             with mmap.mmap(crate.fileno(), size, offset=low, access=mmap.ACCESS_READ) as window:
                 words = np.frombuffer(window, np.uint64, size // 8)[max(0, pages - low) // 8 :]
                 sums = np.add.reduceat(words, np.arange(0, len(words), _PAGE // 8))
-                del words  # what is still looked at cannot be closed
+                del words  # a mapping with a live view cannot be closed
                 trace = zlib.crc32(window[size // 8 * 8 :], zlib.crc32(sums, trace))
     return trace
 
@@ -168,7 +166,7 @@ def _line(facts: dict) -> str:
 
 
 def _lines(path: Path) -> list[dict | None]:
-    """What the lines say, up to the first that was not written whole; at least one, None if there is no such file."""
+    """What the lines say, up to the first incomplete one; at least one item, None if there is no such file."""
     found: list[dict | None] = []
     try:
         for line in path.read_text(errors="replace").splitlines():
@@ -182,7 +180,7 @@ def _lines(path: Path) -> list[dict | None]:
 
 
 def _save(facts: dict) -> _Save | None:
-    """The save of a line, or None if it is none."""
+    """The save that a line describes, or None if it does not describe one."""
     try:
         save = _Save(**facts | {name: base64.b64decode(facts[name]) for name in _BYTES})
         numbers = [save.puts, save.spent, save.end, save.begin, save.trace]

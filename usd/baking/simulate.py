@@ -28,9 +28,9 @@ from .procedure import BakeResult, known_notes, read_asked, write_told
 from .stencils import Stencils
 
 STRANDS = 2000
-"""Strands simulated where no number is given."""
+"""Strands simulated if no number is given."""
 STIFFEST_VOLUME = 100.0
-"""Stiffer is not what anybody means, and takes the solver ever longer."""
+"""Nobody means a stiffer one, and the solver would take ever longer."""
 
 
 def simulate(
@@ -84,7 +84,7 @@ def simulate(
 
 
 class _SimulatedPoser:
-    """Points of one groom out of a simulation of some of its strands."""
+    """Points of one groom, from a simulation of some of its strands."""
 
     def __init__(
         self, item: StageGroom, codes: list[float], first: float, material, count: int, *, volume, loop, progress
@@ -96,8 +96,8 @@ class _SimulatedPoser:
             raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
         codes, clip = Stencils(item, codes, first).codes, replace(self._rig.clip, loop=loop)
         seconds = self._rig.border.seconds(codes)
-        # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest. A loop has no
-        # beginning: what is wanted of it comes after some time.
+        # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest. A loop has no beginning, so
+        # its wanted frames come after a run-in.
         wanted = clip.wrapped(seconds) if loop else np.maximum(seconds, clip.start)
         times = np.unique([clip.start - RUN_IN * loop, *wanted])
         self._row = dict(zip(codes, np.searchsorted(times, wanted), strict=True))
@@ -123,9 +123,7 @@ class _SimulatedPoser:
         return self._placer.points(time_code, joints, lambda strands: moved[strands])
 
     def _push(self, moved: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> None:
-        """Keep the strands that follow out of the body, in place: they lie elsewhere than those that they follow, which the
-        solver kept out of it.
-        """
+        """Push the following strands out of the body, in place: the solver kept only the strands that they follow out of it."""
         followed = moved[self._others]
         with ThreadPoolExecutor(cores()) as pool:
             self._resolver.apply(followed, joints, shape, pool.map)

@@ -38,7 +38,7 @@ class Spool:
 
     Args:
         out: the output file.
-        fingerprint: digest of everything the samples depend on; a spool of another one is thrown away.
+        fingerprint: digest of everything the samples depend on; a spool with another one is deleted.
 
     Raises:
         NeuralocksError: the folder cannot be written, the output is write-protected, or another bake is writing it.
@@ -46,7 +46,7 @@ class Spool:
 
     def __init__(self, out: Path, fingerprint: str):
         self.out = out
-        self._sure: set[Path] = set()  # frames written or looked through by this process
+        self._sure: set[Path] = set()  # frames written or checked by this process
         self._spares: list[Path] = []
         self.folder = _folder(out)
         try:
@@ -62,7 +62,7 @@ class Spool:
         except OSError as error:
             self.close()
             raise cannot_write(out, error) from None
-        # USD keeps layers by name for as long as anybody holds them, so the name is a new one each time.
+        # USD keeps layers by name for as long as anybody holds them, so each time the name is a new one.
         self.layer_path = self.folder / f"{uuid.uuid4().hex}.part.usdc"
 
     def _forget_others(self, fingerprint: bytes) -> None:
@@ -76,17 +76,17 @@ class Spool:
             _remove(stray)
 
     def _named(self, pattern: str) -> list[Path]:
-        """What is in the folder under names of ours: whatever else a user put there stays."""
+        """What is in the folder under our names: anything else that a user put there stays."""
         return [path for path in self.folder.iterdir() if re.fullmatch(pattern, path.name)]
 
     def go_on(self, plan: str, spent: Sequence[int]) -> int:
-        """Take up the layer that was left by a bake of the same plan, if one was, under `layer_path`.
+        """Take over the layer that a bake of the same plan left, if there is one, as `layer_path`.
 
         Args:
             plan, spent: see `SaveLog`.
 
         Returns:
-            How many samples are in it; 0 means that a new one is to be made.
+            How many samples are in it; 0 means that a new one must be made.
         """
         self.log = SaveLog(self.folder / _LOG, plan, spent)
         left, puts = self._named(_LAYER), 0
@@ -100,7 +100,7 @@ class Spool:
         return 0
 
     def drop_layers(self) -> None:
-        """Remove the layers that were left, to make a new one.
+        """Remove left-over layers, to make a new one.
 
         Raises:
             CannotWrite: the file system refuses.
@@ -112,11 +112,11 @@ class Spool:
             raise cannot_write(self.out, error) from None
 
     def size(self) -> int:
-        """Bytes of all that is there to go on from."""
+        """Bytes of all data that is there to resume from."""
         return sum(path.stat().st_size for path in self._named(_KEPT))
 
     def holds(self, batch: int, time_code: float, points: int) -> bool:
-        """Whether the points (points, 3) of a frame are there, all of them, as they were written."""
+        """Whether all points (points, 3) of a frame are there, as they were written."""
         path = self._path(batch, time_code)
         if path not in self._sure and has_size(path, points) and is_whole(path):
             self._sure.add(path)
@@ -135,7 +135,7 @@ class Spool:
             raise NeuralocksError(f"{path}: cannot be read ({error}); bake again") from None
 
     def write(self, batch: int, time_code: float, array: np.ndarray) -> None:
-        """Keep the points (P, 3) of a finished frame."""
+        """Store the points (P, 3) of a finished frame."""
         path = self._path(batch, time_code)
         try:
             write_frame(path, array, self._spares.pop() if self._spares else None)
@@ -144,8 +144,8 @@ class Spool:
         self._sure.add(path)
 
     def forget(self, batch: int, time_code: float) -> None:
-        """Let go of a frame that nothing needs any more; nothing happens where it is not there. A later one takes its place on
-        the disk, which is faster by far than to make room for each.
+        """Release a frame that is no longer needed, if it is there. A later one reuses its space on the disk, which is much faster
+        than allocating space for each.
         """
         path = self._path(batch, time_code)
         self._sure.discard(path)
@@ -155,7 +155,7 @@ class Spool:
             self._spares.append(spare)
 
     def keep_only(self, frames: Iterable[tuple[int, float]]) -> None:
-        """Remove all frames but those of these batches and time codes: a bake of other frames may have left some."""
+        """Remove all frames except those of these batches and time codes: a bake of other frames may have left some."""
         kept = {self._path(batch, code) for batch, code in frames}
         for path in self._named(_FRAME):
             if path not in kept:
@@ -163,7 +163,7 @@ class Spool:
                 _remove(path)
 
     def finish(self) -> None:
-        """Put the assembled layer under its final name and remove the rest, which is not stopped halfway."""
+        """Move the assembled layer to its final name and remove the rest; this is not stopped halfway."""
         with deferred():
             try:
                 reach_disk(self.layer_path)
@@ -173,7 +173,7 @@ class Spool:
             self.discard()
 
     def close(self) -> None:
-        """Leave the finished frames for a later bake to go on from, and no folder where there are none."""
+        """Leave the finished frames for a later bake to resume from; if there are none, leave no folder."""
         if kept(self.out):
             for spare in self._spares:
                 with suppress(OSError):
@@ -183,12 +183,12 @@ class Spool:
             self.discard()
 
     def discard(self) -> None:
-        """Remove what is ours, and the folder and those made for an output that was not written if nothing else is in them; once
-        the folder is let go of, what is in it may be another bake's, and stays.
+        """Remove our files, then this folder and those made for an output that was not written, unless something else is in them.
+        Once the lock is released, what is in the folder may be another bake's, and stays.
         """
         if not self._lock.held:
             return
-        # Before the lock is given up: another process that takes it would lose what is its own.
+        # Before the lock is released: otherwise a process that takes it would lose its own files.
         for path in list(self.folder.glob("*")):
             if re.fullmatch(rf"{_KEPT}|{_STRAY}", path.name):
                 with suppress(OSError):
@@ -201,7 +201,7 @@ class Spool:
 
 
 def kept(out: Path) -> int:
-    """How many finished frames of an interrupted bake lie beside its output, counted for each batch of grooms."""
+    """How many finished frames of an interrupted bake are beside its output, counted for each batch of grooms."""
     folder = _folder(out)
     frames, layers = (sum(1 for _ in folder.glob(f"*.{ending}")) for ending in ("frame", "part.usdc"))
     return frames + (spent_frames(folder / _LOG) if layers else 0)
@@ -212,7 +212,7 @@ def _folder(out: Path) -> Path:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether it is a file, and no link to one."""
+    """Whether it is a file, and not a link to one."""
     try:
         return stat.S_ISREG(path.lstat().st_mode)
     except OSError:
@@ -239,12 +239,12 @@ def fingerprint(files, values: dict) -> str:
 
 
 def unsaved_digest(layers) -> str:
-    """Digest of what layers (Sdf.Layer) hold that no file does."""
+    """Digest of what layers (Sdf.Layer) hold that is in no file."""
     return hashlib.sha256("".join(sorted(layer.ExportToString() for layer in layers)).encode()).hexdigest()
 
 
 def program_files() -> list[Path]:
-    """The program's own files: frames of another version of it are not gone on from."""
+    """The program's own files: a bake does not resume from frames of another version."""
     import neuralocks_core
 
     folders = Path(__file__).parents[1], Path(neuralocks_core.__file__).parent

@@ -9,13 +9,12 @@ from .sample_layer import in_order
 
 
 class Stencils:
-    """Which samples of a groom the velocity at each time code is made of.
+    """Which samples of a groom the velocity at each time code is computed from.
 
-    Central differences over one and two frames to both sides, right to fourth order: at 24 frames a second within 2 %
-    for hair that swings three times a second. Where the animation begins and ends, and at a cut, where the character is
-    put elsewhere, the differences are taken to one side, to second order: before its first sample hair is at rest,
-    after its last one the body stands and hair swings on. The velocity at a time code depends on that time code only,
-    not on which others are baked.
+    Central differences over one and two frames on both sides, accurate to fourth order: at 24 frames a second within 2 % for hair
+    that swings three times a second. Where the animation begins and ends, and at a cut, where the character jumps, differences are
+    one-sided, to second order: before the first sample hair is at rest, after the last one the body stands still and hair swings
+    on. The velocity at a time code depends on that time code only, not on which others are baked.
 
     Args:
         item: the groom.
@@ -26,8 +25,7 @@ class Stencils:
     Attributes:
         wanted: time codes to write.
         codes: ascending time codes at which points are needed.
-        puts: in the order in which they are written, "points" or "velocities", time code, and at which ones points are
-            needed for it.
+        puts: in writing order, "points" or "velocities", the time code, and the time codes at which it needs points.
     """
 
     def __init__(self, item: StageGroom, codes: list[float], origin: float, velocities: bool = True):
@@ -38,7 +36,7 @@ class Stencils:
         after = np.searchsorted(rig.clip.times, rig.clip.cuts - 1e-9)
         self._before, self._after = clip[after - 1], clip[after]
         self._origin, self._step, self._rate = origin, border.frame, border.rate / border.frame
-        # Neighbours that are samples themselves keep the very same number.
+        # Neighbours that are samples themselves keep exactly the same number.
         self._known = np.array(codes, float)
         self.puts: list[tuple[str, float, list[float]]] = [
             (name, code, [code] if name == "points" else [other for other, _ in self.terms(code)])

@@ -8,13 +8,13 @@ from .stencils import Stencils
 
 
 class Uses:
-    """Of a layer's samples, counted in the order in which they are put into it.
+    """The frames that a layer's samples need; samples are counted in the order in which they are put into it.
 
     Args:
-        plans: of each batch of grooms, what each of them is made of.
+        plans: for each batch, what the samples of each groom need.
 
     Attributes:
-        spent: ascending, for each frame how many samples there are once it is used up.
+        spent: ascending; for each frame, the number of samples after which it is used up.
     """
 
     def __init__(self, plans: Sequence[Sequence[Stencils]]):
@@ -34,11 +34,11 @@ class Uses:
         return sorted(self._after[batch])
 
     def over(self, batch: int, code: float, puts: int) -> bool:
-        """Whether a frame is used up once there are so many samples."""
+        """Whether a frame is used up after this many samples."""
         return self._after[batch][code] <= puts
 
     def used_up(self, puts: int) -> Iterator[tuple[int, float]]:
-        """Batch and time code of the frames that are used up once there are so many samples, each of them once."""
+        """Batch and time code of the frames that are used up after this many samples, each frame once."""
         while self._next is not None and self._next[0] <= puts:
             yield self._next[1:]
             self._next = next(self._waiting, None)

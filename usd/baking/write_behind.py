@@ -8,7 +8,7 @@ import threading
 class WriteBehind:
     """Runs calls one after another on a thread.
 
-    `put` waits until the call before is done, so that no more than the arrays of one call are held. The first error of
+    `put` waits until the previous call is done, so that the arrays of only one call are held. The first error of
     a call is raised from the next `put`, or at the end; later calls are then dropped.
     """
 
@@ -32,7 +32,7 @@ class WriteBehind:
 
     def __exit__(self, kind, error, trace) -> None:
         if kind is not None:
-            self._error = self._error or error  # what still waits is dropped
+            self._error = self._error or error  # calls that still wait are dropped
         self._calls.put(None)
         self._thread.join()
         if kind is None and self._error is not None:

@@ -8,13 +8,13 @@ from neuralocks_core.errors import NeuralocksError
 
 
 def check_number(option: str, value, low: float, high: float = math.inf, *, whole: bool = False) -> None:
-    """Refuse what is no number, or none within a range.
+    """Refuse what is not a number, or not within a range.
 
     Args:
-        option: whose value it is, such as `--strength`.
+        option: its name, such as `--strength`.
         value: as given.
         low, high: least and largest.
-        whole: whether it counts something.
+        whole: whether it must be a whole number.
 
     Raises:
         NeuralocksError: names the option and the range.

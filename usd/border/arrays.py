@@ -36,9 +36,7 @@ def row_matrices(matrices: np.ndarray) -> Vt.Matrix4dArray:
 
 
 def quaternions(wxyz: np.ndarray) -> Vt.QuatfArray:
-    """Quaternions (J, 4) wxyz as USD keeps them, with the imaginary part first; made one by one, those of a long shot
-    would take seconds.
-    """
+    """Quaternions (J, 4) wxyz as USD keeps them, imaginary part first; one by one, a long shot's would take seconds."""
     return Vt.QuatfArray.FromNumpy(np.ascontiguousarray(np.roll(wxyz, -1, axis=1), np.float32))
 
 

@@ -24,7 +24,7 @@ def names_damage(function):
     def run(*args, **kwargs):
         try:
             return function(*args, **kwargs)
-        except (Tf.ErrorException, UnicodeDecodeError) as error:  # the latter of names in a damaged crate file
+        except (Tf.ErrorException, UnicodeDecodeError) as error:  # the latter from names in a damaged crate file
             source = next(iter(arguments.bind(*args, **kwargs).arguments.values()))
             source = getattr(source, "shot", source)
             path = getattr(source, "path", source)
@@ -37,7 +37,7 @@ def names_damage(function):
 
 @contextmanager
 def named(out: Path) -> Iterator[None]:
-    """Turns USD's errors in what writes a file into one line that names it."""
+    """Turns USD's errors while a file is written into one line that names the file."""
     try:
         yield
     except Tf.ErrorException as error:
@@ -60,7 +60,7 @@ def first_line(error: Exception) -> str:
 
 
 def text_of(error) -> str:
-    """The whole message of a USD error, with the numbers of bytes that are not UTF-8."""
+    """The whole message of a USD error, with bytes that are not UTF-8 as numbers."""
     try:
         return str(error)
     except UnicodeDecodeError as no_text:

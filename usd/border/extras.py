@@ -7,7 +7,7 @@ from neuralocks_core.errors import NeuralocksError
 
 
 def check_training() -> None:
-    """Refuse to train without what learns, what writes the model, and what simulates.
+    """Refuse to train without the packages that learn, write the model, and simulate.
 
     Raises:
         NeuralocksError: names the package that is missing, or that is there and does not load.
@@ -17,6 +17,6 @@ def check_training() -> None:
             import_module(name)
         except ModuleNotFoundError as error:
             raise NeuralocksError(f'train: {error.name} is not installed; pip install "neuralocks[train]"') from None
-        except (ImportError, OSError) as error:  # a library that its compiled part asks for, say; on Windows an OSError
+        except (ImportError, OSError) as error:  # such as a library that its compiled part needs; on Windows an OSError
             why = " ".join(str(error).split()) or type(error).__name__
             raise NeuralocksError(f"train: {name} does not load ({why}); reinstall it") from None

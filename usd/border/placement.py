@@ -14,14 +14,14 @@ from neuralocks_core.errors import NeuralocksError
 from .arrays import column_matrix
 
 KEPT = 64
-"""So many places of a prim are remembered: in a crowd each groom is held against the same few of each character."""
+"""How many transforms of a prim are cached: in a crowd, each groom is compared with the same few of each character."""
 
 
 class Unplaced(NeuralocksError):
-    """A prim stands nowhere at some time: its transform, or one above, has zero scale, or is not finite.
+    """A prim cannot be placed at some time: its transform, or one above, has zero scale or is not finite.
 
     Attributes:
-        prim: the one that was to be placed.
+        prim: the prim to be placed.
     """
 
     def __init__(self, prim: Usd.Prim, what: str):
@@ -43,12 +43,12 @@ class Placement:
 
     @cached_property
     def _still(self) -> np.ndarray | None:
-        """The one place of what stands still; asked first where it matters, as that of what is left out may be none."""
-        # Exporters key what stands still with a single sample and no default: the default time would drop its scale.
+        """The only place of a prim that stands still; evaluated only when needed, since a prim that is left out may have none."""
+        # Exporters write what stands still as a single sample without a default: at the default time, its scale would be lost.
         return None if self.samples else self._evaluate(Usd.TimeCode.EarliestTime())
 
     def at(self, time_code: float) -> np.ndarray:
-        """Transform (4, 4) at a time code; not to be written to.
+        """Transform (4, 4) at a time code; do not modify it.
 
         Raises:
             NeuralocksError: it is not finite or flattens space.
@@ -64,7 +64,7 @@ class Placement:
 
     @property
     def reference(self) -> np.ndarray:
-        """Transform (4, 4) at rest: the one place of a prim that does not move, else its place at the first sample."""
+        """Transform (4, 4) at rest: the only place of a prim that does not move, otherwise its place at the first sample."""
         return self._still if self._still is not None else self.at(self.samples[0])
 
     @property
@@ -76,10 +76,10 @@ class Placement:
             return False
 
     def whose(self, wrong: Callable[[np.ndarray], bool], time_code: float | None = None) -> str:
-        """Whose transform it is that is wrong here, in words: the prim's own, or that of one above.
+        """Whose transform is wrong, in words: the prim's own, or that of a prim above.
 
         Args:
-            wrong: tells it of a transform (4, 4).
+            wrong: whether a transform (4, 4) is wrong.
             time_code: when; at rest if left out.
         """
         code = self.samples[0] if time_code is None and self.samples else time_code
@@ -104,7 +104,7 @@ class Placement:
 
 
 def _upwards(prim: Usd.Prim) -> Iterator[UsdGeom.Xformable]:
-    """A prim and those above it that place it, as far as these have transforms."""
+    """A prim and the prims above that place it, as far as they have transforms."""
     while prim and not prim.IsPseudoRoot():
         if xformable := UsdGeom.Xformable(prim):
             yield xformable
@@ -122,7 +122,7 @@ def _flat(matrix: np.ndarray) -> bool:
 
 
 def _knots(xformable: UsdGeom.Xformable) -> list[float]:
-    """Time codes at which the transform's splines have knots: animation curves, of which USD counts no samples."""
+    """Time codes at which the transform's splines have knots: animation curves, which USD does not count as samples."""
     curves = [op.GetAttr() for op in xformable.GetOrderedXformOps()]
-    splined = [curve for curve in curves if getattr(curve, "HasSpline", bool)()]  # older versions of USD know none
+    splined = [curve for curve in curves if getattr(curve, "HasSpline", bool)()]  # older versions of USD have none
     return [time for curve in splined for time in curve.GetSpline().GetKnots().keys()]

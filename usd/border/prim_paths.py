@@ -9,10 +9,10 @@ from neuralocks_core.errors import NeuralocksError
 
 
 def prim_path(given, name: str) -> str | None:
-    """One path as text; None where none is given.
+    """One path as text; None if none is given.
 
     Raises:
-        NeuralocksError: it is no path; `name` is the argument's.
+        NeuralocksError: it is not a path; `name` is the argument's.
     """
     if given is None:
         return None
@@ -23,6 +23,6 @@ def prim_path(given, name: str) -> str | None:
 
 
 def prim_paths(given, name: str) -> list[str]:
-    """Several paths as text, or a lone one."""
+    """Several paths as text, or a single one."""
     alone = isinstance(given, str) or not isinstance(given, Iterable)
     return [prim_path(each, name) for each in ([given] if alone else given)]

@@ -17,14 +17,14 @@ from .stopping import check
 LAYERS = (".usd", ".usda", ".usdc")
 GLTF = (".vrm", ".glb", ".gltf")
 OTHERS = (".fbx", *GLTF, ".abc", ".blend")
-"""Characters and hair in other formats, which USD reads with plug-ins alone or not at all."""
+"""Characters and hair in other formats, which USD reads only with plug-ins or not at all."""
 
 
 def open_stage(path) -> Usd.Stage:
     """Open a USD file.
 
     Raises:
-        NeuralocksError: it is missing, or no readable USD file.
+        NeuralocksError: it is missing, or not a readable USD file.
     """
     path = as_path(path, "path")
     check_file(path)
@@ -43,7 +43,7 @@ def open_stage(path) -> Usd.Stage:
 
 
 def check_file(path: Path) -> None:
-    """Refuse what is no file.
+    """Refuse what is not a file.
 
     Raises:
         NeuralocksError: it is missing, or a folder.
@@ -64,27 +64,27 @@ def _remedy(path: Path) -> str:
 
 def used_files(stage: Usd.Stage) -> list[str]:
     """Files that the stage is composed of."""
-    # What lies inside a package is of the package's file.
+    # Layers inside a package count as the package's file.
     paths = (layer.realPath for layer in stage.GetUsedLayers())
     return sorted({Ar.SplitPackageRelativePathOuter(path)[0] for path in paths if path})
 
 
 def unsaved(stage: Usd.Stage) -> list[Sdf.Layer]:
-    """Layers of the stage that hold what no file does: a host keeps what its user edits, and who opens the stage there sees it."""
+    """Layers of the stage with unsaved edits: a host application keeps them in memory, and stages opened in it show them."""
     return [layer for layer in stage.GetUsedLayers() if not layer.empty and (layer.dirty or not layer.realPath)]
 
 
 def check_layer_name(out: Path) -> None:
-    """Refuse to write USD under a name that is no USD layer's.
+    """Refuse to write USD under a name that is not a USD layer's.
 
     Raises:
-        NeuralocksError: it has another ending, is a folder's, or says more to USD than a name.
+        NeuralocksError: it has another extension, is a folder's, or has a special meaning in USD.
     """
     if ":SDF_FORMAT_ARGS:" in str(out):
         raise NeuralocksError(f"{out}: USD reads what follows :SDF_FORMAT_ARGS: as arguments; choose another name")
     if out.suffix.lower() not in LAYERS:
         raise NeuralocksError(f"{out}: is written as a USD layer; end its name with {', '.join(LAYERS)}")
-    if os.path.isdir(out):  # False of a name too long for a file, too, which is told when it is written
+    if os.path.isdir(out):  # also False for a name too long for a file; writing it reports that
         raise NeuralocksError(f"{out}: is a folder; give a file name")
 
 
@@ -92,7 +92,7 @@ def check_not_input(out: Path, stage: Usd.Stage) -> None:
     """Refuse to write over a file that the stage is composed of.
 
     Raises:
-        NeuralocksError: `out` is one of them, by whatever name.
+        NeuralocksError: `out` is one of them, under any name.
     """
     if any(one_file(out, path) for path in used_files(stage)):
         raise NeuralocksError(f"{out}: is part of the shot itself; choose another name")
@@ -116,17 +116,17 @@ def check_not_over(out: Path, stage: Usd.Stage) -> None:
 
 
 def one_file(out: Path, path: str | Path) -> bool:
-    """Whether a file that will be written is one that there is; folders on the way to it may still be missing."""
+    """Whether a file to be written is a given existing one; folders in its path may still be missing."""
     if not os.path.exists(path):
         return False
     return os.path.realpath(out) == os.path.realpath(path) or (os.path.exists(out) and os.path.samefile(out, path))
 
 
 def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
-    """Write a new USD file at once under its final name, with what `author` puts into the stage.
+    """Write a new USD file with what `author` puts into the stage; it gets its final name when it is complete.
 
     Raises:
-        NeuralocksError: the path has another ending, or cannot be written.
+        NeuralocksError: the path has another extension, or cannot be written.
     """
     check_layer_name(path)
     with named(path), atomic_write(path) as part:
@@ -140,9 +140,7 @@ def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
 
 
 def refresh_open(path: Path) -> None:
-    """Let stages that this process has open see a file that was written anew, and those that it opens: USD keeps a layer as
-    long as anybody holds it.
-    """
+    """Let stages that this process has open, or opens later, see a rewritten file: USD keeps a layer as long as anybody holds it."""
     layer = Sdf.Layer.Find(os.path.realpath(path)) or Sdf.Layer.Find(str(path))
     if layer:
         layer.Reload(force=True)

@@ -17,7 +17,7 @@ if hasattr(signal, "SIGHUP"):  # not on Windows; a job of nohup is deaf to it, a
     _ENDS[signal.SIGHUP] = signal.SIG_DFL
 
 _number = 0
-"""Of the signal that came, 0 for none."""
+"""Number of the signal that came, 0 for none."""
 _deferring = False
 
 
@@ -42,9 +42,7 @@ def stoppable() -> Iterator[None]:
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """In this block Ctrl-C waits for the next `check`, or for the block's end: compiled modules stay half made where it
-    breaks into their loading.
-    """
+    """In this block, Ctrl-C waits for the next `check` or the block's end: it would leave compiled modules half loaded."""
     global _deferring
     before, _deferring = _deferring, True
     try:
@@ -67,7 +65,7 @@ def stopped() -> bool:
 
 
 def check() -> None:
-    """Raise KeyboardInterrupt if an earlier one waits, or was swallowed."""
+    """Raise KeyboardInterrupt if an earlier one is pending, or was swallowed."""
     if stopped():
         raise KeyboardInterrupt
 

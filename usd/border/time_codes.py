@@ -11,9 +11,9 @@ from .amounts import check_number
 
 MOST = 1_000_000
 NEAR = 1e-3
-"""A time code that is nearer to a frame than this share of one was rounded from it,"""
+"""A time code nearer to a frame than this share of a frame was rounded from it."""
 NEARER = 1e-5
-"""and one that is nearer than this to a part of a frame from that."""
+"""A time code nearer than this share to a simple part of a frame was rounded from that part."""
 MOST_SUBFRAMES = 64
 
 
@@ -38,7 +38,7 @@ def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
 
 
 def time_codes(frames, first: float, last: float, subframes: int = 1, frame: float = 1.0) -> list[float]:
-    """Ascending time codes without doubles.
+    """Ascending time codes without duplicates.
 
     Args:
         frames: None for the whole range, `FIRST:LAST[:STEP]`, or any iterable of time codes.
@@ -47,7 +47,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
         frame: time codes from one frame to the next.
 
     Raises:
-        NeuralocksError: no frame, too many, or something that is no time code.
+        NeuralocksError: no frame, too many, or something that is not a time code.
     """
     check_number("--subframes", subframes, 1, MOST_SUBFRAMES, whole=True)
     if frames is None or isinstance(frames, str):
@@ -67,8 +67,8 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
 
 
 def on_frame(code: float, first: float, frame: float) -> float:
-    """A time code to nine digits. Where a frame is no whole number, that of the shot's frame, or simple part of one, that was
-    meant: the same time is the same number in every part of a range that is baked in parts, however its ends were rounded.
+    """A time code to nine digits. If a frame is not one time code, it becomes the shot's frame, or simple part of one, that was
+    meant. So the same time is the same number in every part of a range, however the ends of parts were rounded.
     """
     count = (code - first) / frame
     if frame != 1 and math.isfinite(count):
@@ -81,8 +81,8 @@ def on_frame(code: float, first: float, frame: float) -> float:
 
 
 def given_cuts(cuts, loop: bool = False) -> list[float] | None:
-    """Time codes of cuts as the layers below take them: ascending, without doubles; None where they are to be found. A loop
-    has none, whatever its clip looks like.
+    """Time codes of cuts, ascending, without duplicates; None if they are to be detected. A loop has none, whatever its clip looks
+    like.
 
     Raises:
         NeuralocksError: some are given for a loop.
@@ -95,7 +95,7 @@ def given_cuts(cuts, loop: bool = False) -> list[float] | None:
 
 def _whole_range(first: float, last: float, frame: float) -> tuple[float, float, float]:
     """First and last time code of a shot's frames, and from one to the next."""
-    # Where a time code is a frame, frames are whole numbers; else the shot begins with one.
+    # If a time code is a frame, frames are whole numbers; otherwise the shot begins with a frame.
     begin = float(math.ceil(first - 1e-9)) if frame == 1 else first
     return begin, max(last, begin), frame
 

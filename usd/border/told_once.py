@@ -6,9 +6,9 @@ from collections.abc import Hashable, Iterable
 
 _PATH = re.compile(r"(?<![\w.])/[\w/:.{}=-]*\w")
 _FEW = 2
-"""Up to so many texts of one kind stay apart."""
+"""Up to this many similar texts stay separate."""
 _NAMED = 8
-"""So many prims are named."""
+"""Up to this many prims are named."""
 
 
 def without_paths(text: str) -> str:
@@ -17,7 +17,7 @@ def without_paths(text: str) -> str:
 
 
 def grouped(things: Iterable, key) -> list[list]:
-    """Things whose keys are equal side by side, in the order of the first of each."""
+    """Groups of things with equal keys, in the order of each group's first thing."""
     groups: dict[Hashable, list] = {}
     for thing in things:
         groups.setdefault(key(thing), []).append(thing)
@@ -25,15 +25,15 @@ def grouped(things: Iterable, key) -> list[list]:
 
 
 def told_once(texts: Iterable[str]) -> list[str]:
-    """Texts of which those that differ in nothing but prim paths are one, with these prims of the others, or the first and the
-    last of many.
+    """Texts, with those that differ only in prim paths merged into one that also names the other prims, or of many only the first
+    and the last.
     """
     result = []
     for same in grouped(dict.fromkeys(texts), without_paths):
         if len(same) <= _FEW:
             result += same
             continue
-        # In the first place where they differ: before it may stand a file that all of them tell of.
+        # At the first position where they differ: before it there may be a file that all of them name.
         columns = zip(*(_PATH.findall(text) for text in same), strict=True)
         _, *others = next(column for column in columns if len(set(column)) > 1)
         if len(others) > _NAMED:

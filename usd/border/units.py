@@ -10,10 +10,10 @@ from pxr import Sdf, Usd, UsdGeom
 from neuralocks_core.errors import NeuralocksError
 
 SLOWEST, FASTEST = 12.0, 600.0
-"""Time codes per second between which one time code is a frame, of a slow-motion camera too; other stages count
-seconds, or milliseconds."""
+"""Between these time codes per second, one time code is a frame, also of a slow-motion camera; other stages count seconds, or
+milliseconds."""
 USUAL = 24.0
-"""Frames per second of a stage that tells neither by its time codes nor by framesPerSecond how many there are."""
+"""Frames per second of a stage that does not tell them, neither by its time codes nor by framesPerSecond."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Border:
         up_axis: "Y" or "Z".
         rate: time codes per second.
         frame: time codes from one frame to the next.
-        guessed: whether the stage does not tell that, so that it is USUAL frames a second.
+        guessed: whether the stage does not tell `frame`, so that USUAL frames per second are assumed.
     """
 
     metres_per_unit: float
@@ -52,7 +52,7 @@ class Border:
         return np.linalg.inv(self.to_core)
 
     def foreign(self, attribute: Usd.Attribute, *, axis_only: bool = False) -> str:
-        """A remark where an attribute's layer counts in another unit or axis: references convert neither. '' if not."""
+        """A remark if an attribute's layer has another unit or axis, since references convert neither; '' if not."""
         for spec in attribute.GetPropertyStack(Usd.TimeCode.EarliestTime()):
             if differs := self._other_axis(spec.layer) if axis_only else self.differing(spec.layer):
                 name = spec.layer.GetDisplayName()
@@ -60,7 +60,7 @@ class Border:
         return ""
 
     def differing(self, layer: Sdf.Layer) -> str:
-        """In which unit and axis a layer is written, where they are not these; '' if it says nothing else."""
+        """In which unit and axis a layer is written, if they differ from these; '' if they do not."""
         root, said = layer.pseudoRoot, []
         unit = root.GetInfo("metersPerUnit") if root.HasInfo("metersPerUnit") else self.metres_per_unit
         if abs(unit / self.metres_per_unit - 1) > 1e-3:
@@ -91,7 +91,7 @@ class Border:
         """Read and check the stage's metadata.
 
         Raises:
-            NeuralocksError: the unit, axis or rate cannot be meant.
+            NeuralocksError: the unit, axis or rate makes no sense.
         """
 
         def usual(rate: float) -> bool:
@@ -110,7 +110,7 @@ class Border:
         if not (math.isfinite(rate) and 1e-3 < rate < 1e6):
             raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, such as 24")
         shown = float(stage.GetFramesPerSecond()) if stage.HasAuthoredMetadata("framesPerSecond") else math.nan
-        # At 1 and 1 a stage counts seconds all the same.
+        # With both at 1, a stage still counts seconds.
         if usual(rate) or rate == shown > 1:
             return cls(unit, up, rate)
         return cls(unit, up, rate, rate / (shown if usual(shown) else USUAL), not usual(shown))

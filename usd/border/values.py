@@ -18,10 +18,10 @@ SHAPES = {
 
 
 def as_numbers(attribute: Usd.Attribute, wanted: str, value, dtype=float) -> np.ndarray:
-    """A value of an attribute as numbers, in the shape of the `wanted` type; no elements where it has none.
+    """A value of an attribute as numbers, in the shape of the `wanted` type; empty if it has none.
 
     Raises:
-        NeuralocksError: it is of a type that cannot be read so.
+        NeuralocksError: its type cannot be read as the wanted one.
     """
     shape = SHAPES[wanted]
     try:
@@ -49,7 +49,7 @@ def as_names(attribute: Usd.Attribute, value) -> tuple[str, ...]:
 
 
 def _unlike(attribute: Usd.Attribute, wanted: str) -> NeuralocksError:
-    # For an attribute of a schema USD tells the schema's type, whatever a layer says.
+    # For an attribute of a schema USD reports the schema's type, whatever a layer says.
     told = (spec.typeName for spec in attribute.GetPropertyStack())
     own = next((name for name in told if name != wanted), attribute.GetTypeName())
     return NeuralocksError(

@@ -41,25 +41,25 @@ def main(arguments: list[str] | None = None) -> None:
     # Redirected output may be in a code page that lacks a character of a file's name: better shown as its number.
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
-    # Drawing without a home folder that can be written, as on a farm, is no reason to talk.
+    # If the home folder cannot be written, as on a farm, matplotlib should not warn about it.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     words = [_kept(word) for word in (sys.argv[1:] if arguments is None else arguments)]
-    if os.name == "nt" and words[:1] == ["join"]:  # no shell there does it
+    if os.name == "nt" and words[:1] == ["join"]:  # shells there do not expand * and ?
         words = [name for word in words for name in _matching(word)]
     try:
         app(one_by_one(words) if words[:1] == ["train"] else words)
-    except OSError as error:  # what reads and writes names its own file; this is a full or closed stdout
+    except OSError as error:  # other errors name their own file; this is a full or closed stdout
         one_line(f"error: {error.filename or 'output'}: {error.strerror or error}; write it elsewhere")
         raise SystemExit(1) from None
 
 
 def _matching(word: str) -> list[str]:
-    """The files that a word with * or ? stands for; itself where there are none."""
+    """The files that a word with * or ? stands for; the word itself if there are none."""
     return (sorted(glob.glob(word)) if {"*", "?"} & {*word} else []) or [word]
 
 
 def _kept(word: str) -> str:
-    """A word, a blank for an empty one: a path of no letters is the current folder to whoever is given it."""
+    """A word, or a blank for an empty one, because an empty path would be taken as the current folder."""
     return f"{word} " if not word or word.startswith("--") and word.find("=") == len(word) - 1 else word
 
 
@@ -294,6 +294,6 @@ def demo_command(
         typer.echo(f"{name}: {path}{took}")
 
 
-# As help lists them: of first need, and then the rest.
+# The order in which help lists them: those needed first, then the rest.
 for first in reversed("demo inspect bake join preview evaluate simulate import grow body train export".split()):
     app.registered_commands.sort(key=lambda each: each.name != first)

@@ -121,7 +121,7 @@ def simulate_command(
 
 
 def _how_to_go_on(out: Path) -> list[str]:
-    """Nobody would look for frames in a folder whose name is hidden."""
+    """How to resume: nobody would look for frames in a hidden folder."""
     from ..baking.spool import kept
 
     frames = kept(out)

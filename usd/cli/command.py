@@ -51,26 +51,26 @@ def command_of(app: typer.Typer):
 
 
 def _out_of_memory(error: Exception) -> bool:
-    """Whether memory was refused to Python, or to torch, which has no type of its own for the processor's."""
+    """Whether Python ran out of memory, or torch, which has no exception type of its own for CPU memory."""
     words = ("can't allocate memory", "not enough memory", "OutOfMemoryError")
     return isinstance(error, MemoryError) or any(word in f"{type(error).__name__} {error}" for word in words)
 
 
 def _load_usd() -> None:
-    """Load all of USD that anything here asks for: Ctrl-C in the middle of it would be lost, and its modules half made."""
+    """Load all USD modules that commands need: Ctrl-C in the middle would be lost, and leave modules half loaded."""
     with deferred():
         for name in ("Ar", "Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdSkel", "UsdUtils", "Vt"):
             importlib.import_module(f"pxr.{name}")
 
 
 def _paragraphs(text: str) -> str:
-    """A docstring whose lines are broken where the terminal ends, not where the source does."""
+    """A docstring without the line breaks of the source, so that the terminal wraps it."""
     return "\n\n".join(" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
 
 
 def _check_words(function, given: dict, usd: bool) -> None:
-    """Refuse empty words, such as a script's variable that was never set leaves behind, and files whose names are no
-    text: USD takes UTF-8 alone, whatever the disk allows.
+    """Refuse empty words, such as an unset variable of a script leaves, and files whose names are not text: USD takes only UTF-8,
+    whatever the disk allows.
     """
     for name, value in given.items():
         for word in value if isinstance(value, list) else [value]:
@@ -86,7 +86,7 @@ def _check_words(function, given: dict, usd: bool) -> None:
 
 
 def _paths(word, usd: bool) -> list[Path]:
-    """A file as its user names it and, since USD asks for that, its whole path; nothing of what is no file."""
+    """A file as its user names it and, since USD asks for that, its absolute path; nothing for what is not a file."""
     if not isinstance(word, Path):
         return []
     with suppress(OSError):  # the current folder may be gone
@@ -95,7 +95,7 @@ def _paths(word, usd: bool) -> list[Path]:
 
 
 def _unreadable(path: Path) -> NeuralocksError:
-    """Why a file's name came in as what is no text."""
+    """The error for a file name that did not come in as text."""
     try:
         name = os.fsencode(path).decode("utf-8")
     except UnicodeError:
@@ -119,14 +119,14 @@ def one_line(text) -> None:
 
 
 def note(notes) -> None:
-    """Print what a user should know; of a crowd, what is the same of many prims once."""
+    """Print notes for the user; notes that are the same for many prims are printed once."""
     for text in told_once(notes):
         one_line(f"note: {text}")
 
 
 @contextmanager
 def noting_when_cut_short(notes: Callable[[], list[str]]) -> Iterator[None]:
-    """In this block, Ctrl-C or a full disk also prints what a user should know of the work that is left."""
+    """In this block, Ctrl-C or a full disk also prints what a user should know about the work that is left."""
     try:
         yield
     except BaseException as error:
@@ -136,10 +136,10 @@ def noting_when_cut_short(notes: Callable[[], list[str]]) -> Iterator[None]:
 
 
 def counted(number: int, thing: str) -> str:
-    """How many there are of a thing, in words."""
+    """A number and the thing counted, in words."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def print_json(value) -> None:
-    """Print a plain value for a machine to read; what is no number is null."""
+    """Print a plain value as JSON for a machine to read; NaN becomes null."""
     typer.echo(json.dumps(plain(value), indent=1, default=str))

@@ -51,7 +51,7 @@ Jobs = Annotated[
 
 
 def cut_codes(given: list[str] | None) -> list[float] | None:
-    """Time codes of `--cuts`, given once or several times: none for 'none', None where they are to be found."""
+    """Time codes of `--cuts`, given once or several times: empty for 'none', None to detect them."""
     if not given:
         return None
     text = ",".join(given)

@@ -13,14 +13,14 @@ from ..border.stopping import check
 QUIET_FOR = 2.0
 """[s] Work that is done by then shows no bar."""
 LOG_EVERY = 20.0
-"""[s] Between two lines where stderr is no terminal."""
+"""[s] Between two lines if stderr is not a terminal."""
 
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[..., None]]:
-    """A callback (done, total, message) that draws on stderr, or writes lines where that is no terminal.
+    """A callback (done, total, message) that draws on stderr, or writes lines if that is not a terminal.
 
-    It raises KeyboardInterrupt where work went on after one.
+    It raises KeyboardInterrupt if work went on after an earlier one.
     """
     shown = _Bar(title) if sys.stderr.isatty() else _Log(title)
 
@@ -52,11 +52,11 @@ class _Log:
         print(f"{self._title}: {done / max(total, 1):.0%}{left} {message}", file=sys.stderr, flush=True)
 
     def close(self) -> None:
-        """Nothing to put away."""
+        """Nothing to close."""
 
 
 class _Bar:
-    """A bar of the terminal, from QUIET_FOR on; begun anew when another step follows."""
+    """A bar in the terminal, shown after QUIET_FOR; each new step restarts it."""
 
     def __init__(self, title: str):
         from rich.console import Console
@@ -68,7 +68,7 @@ class _Bar:
             def render(self, task):
                 return Text("left ").append_text(super().render(task))
 
-        # With widths of their own share and time stay whole where a narrow terminal cuts the others short.
+        # With fixed widths, share and time stay whole if a narrow terminal cuts the others short.
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
@@ -94,6 +94,6 @@ class _Bar:
         self._bar.update(self._task, completed=done, total=total, message=message)
 
     def close(self) -> None:
-        """Take the bar off the terminal."""
+        """Remove the bar from the terminal."""
         if self._task is not None:
             self._bar.stop()

@@ -111,7 +111,7 @@ def _reached(report: dict) -> str:
 
 
 def _how_to_go_on(out: Path) -> list[str]:
-    """What a training has kept is thrown away by one that begins anew."""
+    """How to resume: a training that starts anew deletes what an earlier one kept."""
     from neuralocks_core.training.work import work_folder
 
     try:

@@ -112,7 +112,7 @@ SLIDERS = {
 
 
 def described(file: model_file.ModelFile) -> dict:
-    """The content of `description.json`, but for a shot's grooms."""
+    """The content of `description.json`, except for a shot's grooms."""
     with about(file.path):
         spec = BoundarySpec.from_json(file.meta.get("boundary"))
     training = {name: value for name, value in file.meta["training"].items() if name != "curve"}
@@ -134,7 +134,7 @@ def described(file: model_file.ModelFile) -> dict:
 
 
 def _input(spec: BoundarySpec, parts: list[str], how: dict, place: str) -> dict:
-    """Where those parts of the boundary vector lie that a network reads, one after another, and how they are made."""
+    """Positions of the parts of the boundary vector that a network reads, in order, and how they are made."""
     sizes = [spec.slices[name].stop - spec.slices[name].start for name in parts]
     ends = np.cumsum(sizes).tolist()
     return {
@@ -147,7 +147,7 @@ def _input(spec: BoundarySpec, parts: list[str], how: dict, place: str) -> dict:
 
 
 def _history(spec: BoundarySpec, place: str) -> str:
-    """How the history of such a boundary vector is made, of which place of the head."""
+    """How the history of such a boundary vector is made, and from which point of the head."""
     linear = {"gravity": ["f_k"], "velocity": ["v_k"], "none": []}[spec.linear]
     steps = [*linear, "s_k", *["c_k"] * spec.chest]
     return (

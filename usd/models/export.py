@@ -22,15 +22,15 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
     Args:
         model: path of a `.neuralocks` file.
         folder: made if it does not exist; files of an earlier export are replaced.
-        shot: a USD file; of each of its grooms, what no frame changes (`groom_tables`) is written, too.
+        shot: a USD file; the data of its grooms that is the same in every frame (`groom_tables`) is written, too.
         grooms, skeleton, head, joints: as for `bake`.
 
     Returns:
         The files written, `description.json` among them.
 
     Raises:
-        NeuralocksError: the model cannot be read, the folder not be written, or a file of somebody else has the name of
-            one that is to be written.
+        NeuralocksError: the model cannot be read, the folder cannot be written, or a foreign file already has the name of an
+            output.
     """
     file = model_file.read(model)
     folder = as_path(folder, "folder")
@@ -62,7 +62,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
 
 
 def _ours(path: Path) -> bool:
-    """Whether a file may be replaced by a description: it is one, or is not there."""
+    """Whether a description may replace a file: it is one itself, or does not exist."""
     if not path.exists():
         return True
     try:

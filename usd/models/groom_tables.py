@@ -75,7 +75,7 @@ def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, jo
 
 
 def file_names(paths: list[str]) -> list[str]:
-    """A file name for each prim path; they differ in more than case, which some disks do not tell apart."""
+    """A file name for each prim path; they differ in more than case, because some disks ignore case."""
     names: list[str] = []
     for path in paths:
         stem = name = re.sub(r"\W+", "_", path.strip("/"))

@@ -55,17 +55,17 @@ def train(
         settings: fields of `training.regression.RegressionOptions`, or of `training.moment_options.SelfSupervisedOptions`;
             values may be words.
         method: "rollouts" of the solver, or "selfsupervised" as in the paper.
-        paper: with "selfsupervised", what the paper states, its boundary history too, where `settings` say nothing.
+        paper: with "selfsupervised", use what the paper states, including its boundary history, unless `settings` say otherwise.
         skeleton, head, joints: as for `bake`.
-        begin: a model to begin with, "shipped" or "nothing"; left out, the shipped one where the method, the network and what
-            it reads are the shipped model's.
-        resume: go on with an interrupted training.
-        variations: of each style of the library, beside the style itself; 50 at most.
+        begin: a model to start from, "shipped" or "nothing"; if left out, the shipped one if it has the same method, network and
+            inputs.
+        resume: continue an interrupted training.
+        variations: of each style of the library, besides the style itself; 50 at most.
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
         keep_work: leave the simulations and the checkpoint beside the model.
-        tell: called with notes for the user: most of them before the training, whose minutes some would save, and last of
-            all on what it has learned.
+        tell: called with notes for the user: most of them before training, since some may save its minutes, and the last ones on
+            what it has learned.
         progress: called with (done, total, message).
 
     Raises:
@@ -93,7 +93,7 @@ def train(
     check_options(options, rollouts, processes)
     try:
         torch.empty(0, device=options.device)
-    except (RuntimeError, AssertionError):  # the latter where torch was built without CUDA
+    except (RuntimeError, AssertionError):  # the latter if torch was built without CUDA
         raise NeuralocksError(f"--device {options.device}: this machine has no such device; use cpu") from None
     out = as_path(out, "out")
     history = {"spec": paper_boundary()} if paper else {}
@@ -115,7 +115,7 @@ def train(
 
 
 def _command() -> str:
-    """The command line that this is, for the model card; empty where it is none of ours."""
+    """The running command line, for the model card; empty if it is not one of ours."""
     program = Path(sys.argv[0])
     ours = program.name.startswith("neuralocks") or program.parts[-2:] == ("usd", "__main__.py")
     return shlex.join(["neuralocks", *sys.argv[1:]]) if ours else ""
@@ -125,7 +125,7 @@ def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, opti
     """The model that a training begins with, checked before anything large is read.
 
     Raises:
-        NeuralocksError: the one named is none, or differs from what is trained.
+        NeuralocksError: the file named is not a model, or differs from what is trained.
     """
     from neuralocks_core.training.beginning import Beginning
     from neuralocks_core.training.regression_options import RegressionOptions
@@ -145,7 +145,7 @@ def parsed(kind: type, settings: dict) -> dict:
     """Settings with words turned into what the fields of a dataclass hold.
 
     Raises:
-        NeuralocksError: a name is no field, or a word is no such value.
+        NeuralocksError: a name is not a field, or a word is not a value for it.
     """
     fields = {field.name: field for field in dataclasses.fields(kind)}
     result = {}

@@ -40,7 +40,7 @@ MOST_STRANDS = 3000
 """Strands of a groom that are learned from, as in the paper; the network deforms all of them afterwards."""
 
 MOST_VARIATIONS = 50
-"""Of each style, beside the style itself: all of their strands are in memory together."""
+"""Of each style, besides the style itself: all of their strands are in memory together."""
 
 
 def training_scene(
@@ -65,16 +65,16 @@ def training_scene(
             none, without those of others in its file.
         motion: BVH files, or USD files that animate a skeleton; made-up motion is always added.
         skeleton: prim path of the skeleton wanted, where there are several.
-        head: joint that is the head, where its name does not tell.
-        joints: semantic joint -> joint, where names do not tell.
-        seed: of everything random.
-        variations: of each style of the library, beside the style itself; MOST_VARIATIONS at most.
+        head: joint that is the head, if its name does not tell.
+        joints: semantic joint -> joint, if names are not enough.
+        seed: for everything random.
+        variations: of each style of the library, besides the style itself; MOST_VARIATIONS at most.
         tell: called with notes for the user.
         progress: called with (done, total, message) while styles grow.
         **settings: further fields of TrainingScene.
 
     Raises:
-        NeuralocksError: a file cannot be used, there is no hair, or there are to be variations of no library, or too many.
+        NeuralocksError: a file cannot be used, there is no hair, or variations are asked for without the library, or too many.
     """
     grooms, motion = ([words] if isinstance(words, str | Path) else words for words in (grooms, motion))
     if not 0 <= variations <= MOST_VARIATIONS:
@@ -112,7 +112,7 @@ def _file(
     if stage.GetRootLayer() == rig.source.prim.GetStage().GetRootLayer():
         prims = _own(prims, rig, head, joints, notes)
     found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
-    # Beside hair, the grass of a set is none, as controls of the rig are none.
+    # If there is hair, far curves such as the grass of a set are not hair; nor are the rig's controls.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
     found = [_strands(groom_between(prim, a.to_bind, notes, drawn=a.drawn)[0], a.character) for prim, a in near]
     if not any(strands.valid.any() for strands in found):
@@ -165,12 +165,12 @@ def _strands(groom: Groom, character: Character) -> StrandSet:
 
 @names_damage
 def read_clip(path: str, character: Character, notes: list[str] | None = None) -> Clip:
-    """Motion of a file on a character: BVH is retargeted, a skeleton of USD must have the same joints.
+    """Motion of a file on a character: BVH is retargeted; a USD skeleton must have the same joints.
 
     Args:
         path: the file.
-        character: who shall move.
-        notes: to which what a user should know of BVH is added.
+        character: who is to move.
+        notes: what a user should know about BVH is added here.
 
     Raises:
         NeuralocksError: it holds no such motion.

@@ -38,7 +38,7 @@ class Baked:
         return self.shot.border.seconds(self.codes)
 
     def alone(self, item: StageGroom) -> "Baked":
-        """The same at one groom's own samples: between them its points are drawn along chords, which are no hair."""
+        """The same, only at one groom's own samples: between them its points move along chords, unlike hair."""
         return replace(self, codes=np.array(UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples()))
 
     def world(self, item: StageGroom, code: float) -> np.ndarray:
@@ -94,8 +94,8 @@ class Baked:
 def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Baked:
     """Read a bake of any tool: a stage with an animated skeleton and grooms whose points are sampled over time.
 
-    Arguments are as for `bake`; a joint that its user named as the head is told by the bake. Grooms that have no samples
-    beside some that do are left out, with a note.
+    Arguments are as for `bake`; a joint that the user named as the head is recorded in the bake. If some grooms have samples, those
+    without are left out, with a note.
 
     Raises:
         NeuralocksError: it cannot be read, or no groom has samples.
@@ -112,7 +112,7 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
         raise NeuralocksError(
             f"{path}: its grooms have no animated points; bake it first: neuralocks bake {path} -o OUT.usdc"
         )
-    # Exporters key what stands still once: beside moving hair that is no bake.
+    # Exporters write one sample for what stands still: next to moving hair, that is not a bake.
     least = min(2, max(len(codes) for codes in sampled.values()))
     items = tuple(item for item in shot.grooms if len(sampled[item.path]) >= least)
     left = [f"{path}: its points do not move; left out" for path, codes in sampled.items() if len(codes) < least]
@@ -123,7 +123,7 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
 
 
 def _named_head(shot: Shot) -> str | None:
-    """The joint that hair was baked with where names find another one; None where they agree, or no single one is told."""
+    """The joint that hair was baked with, if names find another one; None if they agree, or no single one is recorded."""
     told = {recorded_joint(item.prim) for item in shot.grooms if recorded_joint(item.prim) not in (None, item.joint)}
     known = {name for rig in shot.rigs for name in rig.source.names}
     return told.pop() if len(told) == 1 and told <= known else None

@@ -58,7 +58,7 @@ def demo(out, model=None, *, clip: bool = True, progress: Progress | None = None
     Args:
         out: folder for everything; made if missing.
         model: another model than the shipped one.
-        clip: also make the moving picture.
+        clip: also make the clip.
         progress: called with (done, total, message).
 
     Raises:
@@ -87,6 +87,6 @@ def demo(out, model=None, *, clip: bool = True, progress: Progress | None = None
         try:
             outputs[name] = timed(name, lambda file=file: preview(baked, out / file, progress=progress))
         except NeuralocksError as error:
-            if str(error) not in notes:  # without the extra, neither can be made, for one reason
+            if str(error) not in notes:  # without the extra, both fail for the same reason
                 notes.append(str(error))
     return Demo(shot, result, card, outputs, seconds, notes)

@@ -35,14 +35,14 @@ STRANDS = 600
 """Strands measured of each groom, in whole locks; lengths are measured on all."""
 REFERENCE_STRANDS = 200
 WOUND = 1.2
-"""A strand so many times as long as the line of its network vertices is a coil. Of one that has a kink alone, the points move as
-the line does, better than smoothing tells."""
+"""A strand this many times as long as the line of its network vertices is a coil. If it only has a kink, its points show the line's
+motion better than smoothed ones would."""
 COLLISION_FRAMES, DEEPEST_FRAMES = 32, 3
-"""Frames in which distances to the body are measured: so many evenly over the bake, and those in which hair seems deepest."""
+"""Frames in which distances to the body are measured: the former evenly over the bake, the latter where hair seems deepest."""
 COLLISION_VERTICES, COLLISION_POINTS = 200_000, 6_400_000
-"""Most own vertices whose distances are measured, evenly along the strands, and most places of them in all frames."""
+"""Most of the groom's own vertices that are measured, evenly along the strands, and most positions of them in all frames."""
 SETTLED = 2.0
-"""A pose held for so long [s] should have still hair."""
+"""A pose held for this long [s] should have still hair."""
 
 
 @names_damage
@@ -64,12 +64,12 @@ def evaluate(
         baked: path of the bake, or a `Baked` already read.
         reference: simulate the same strands and compare.
         grooms, skeleton, head, joints: as for `bake`.
-        model: with `reference`, the model whose held-pose answer is shown beside; the shipped one if left out.
-        material: what the hair is made of, for energies and reference; what each groom's bake tells if left out.
+        model: with `reference`, the model whose held-pose answer is shown next to it; the shipped one if left out.
+        material: what the hair is made of, for energies and reference; if left out, what each groom's bake records.
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the file is no bake, or the reference is not installed.
+        NeuralocksError: the file is not a bake, or the reference is not installed.
     """
     beside = _model_beside(model) if reference else None  # before minutes of work
     if not isinstance(baked, Baked):
@@ -105,7 +105,7 @@ def _numbered(say: Progress, number: int, count: int) -> Progress:
 
 
 def _model_beside(given) -> StrandModel | None:
-    """The model whose held-pose answer is shown; the shipped one, if there is one, where none is given."""
+    """The model whose held-pose answer is shown; if none is given, the shipped one, if there is one."""
     try:
         return given if isinstance(given, StrandModel) else StrandModel.load(given)
     except NeuralocksError:
@@ -124,7 +124,7 @@ class _Subject:
         clip = item.attachment.rig.clip
         skin, shapes = RootSkin(self.character, [every], clip), clip.shape_at(baked.times)
         begun = skin.begun(every)
-        # The strands that a solver moved are the first choice of seed 0: those that follow them must be met, too.
+        # The solver moves the strands that seed 0 chooses; another seed also measures strands that follow them.
         self.chosen = every.whole_locks(STRANDS, seed=int("solver" in recorded(item.prim)))
         self.strands: StrandSet = every.subset(self.chosen)
         self._begun = begun.subset(self.chosen)
@@ -134,7 +134,7 @@ class _Subject:
         rest = self.character.canonical(groom.points.astype(float))
         rest_lengths = metrics.strand_lengths(rest, groom.counts)
         count, total = len(self.chosen), len(baked.codes)
-        # The points of a coil also turn about its line, whose motion is the one measured.
+        # The points of a coil also turn about its line, but only the line's motion is measured.
         wound = length[self.chosen] > WOUND * self.strands.length
         times = np.where(wound, passes(self._sampled(rest)), 0)
         self.moved = np.zeros((total, count, K, 3), np.float32)
@@ -149,7 +149,7 @@ class _Subject:
             taut.append(stretch_energy(self._edge_lengths(points)[None], edges_at_rest)[0])
             offset = points - rest
             self.moved[frame] = smoothed(self._sampled(offset), times)
-            if skin.moves:  # what hair does is measured against the skin that it is on
+            if skin.moves:  # hair is measured relative to the skin that it is on
                 self.moved[frame] -= skin.moved(shapes[frame])[self.chosen]
             self.own[frame] = points[self._own]
             self.bends.read(frame, offset)
@@ -161,7 +161,7 @@ class _Subject:
         self.stretch_energy = float(np.mean(taut))
 
     def _within(self, groom, arc: np.ndarray, length: np.ndarray) -> None:
-        """Where the chosen strands' network vertices lie between own vertices, and which own vertices that can move are measured."""
+        """Find where the chosen strands' network vertices lie between own vertices, and which movable own vertices to measure."""
         self._low = np.zeros((len(self.chosen), K), int)
         self._part = np.zeros((len(self.chosen), K, 1))
         own, edges = [], []
@@ -190,7 +190,7 @@ class _Subject:
         return np.linalg.norm(points[self._edges + 1] - points[self._edges], axis=1)
 
     def measures(self, material: Material) -> dict:
-        """Everything that needs no reference; of a groom without hair only that."""
+        """Everything that needs no reference; for a groom without hair, only the counts."""
         baked, times = self.baked, self.baked.times
         result = {"strands": self.item.groom.strand_count, "measured": len(self.chosen), "frames": len(baked.codes)}
         if not len(self.chosen):
@@ -266,7 +266,7 @@ class _Subject:
         }
 
     def compared(self, material: Material, model: StrandModel | None) -> tuple[dict, dict]:
-        """Rows and tip curves beside the reference."""
+        """Rows and tip curves compared with the reference."""
         strands, times = self.strands, self.baked.times
         few = strands.whole_locks(REFERENCE_STRANDS)
         some = self._begun.subset(few)
@@ -297,7 +297,7 @@ class _Subject:
 
     @cached_property
     def _clip(self) -> Clip:
-        """The motion, a loop where the bake tells that it was one."""
+        """The motion; a loop if the bake records that it was one."""
         return replace(self.item.attachment.rig.clip, loop=bool(recorded(self.item.prim).get("loop")))
 
     @cached_property

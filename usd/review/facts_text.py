@@ -7,7 +7,7 @@ from ..border.told_once import grouped, told_once, without_paths
 
 
 def as_text(facts: dict, indent: int = 0) -> str:
-    """The facts for a person to read; what is the same of many prims but for their paths stands there once."""
+    """The facts for a person to read; facts that differ only in their prim's path appear once."""
     lines = []
     pad = "  " * indent
     for name, value in facts.items():
@@ -15,7 +15,7 @@ def as_text(facts: dict, indent: int = 0) -> str:
             continue
         if name == "curve":  # of a long training: thousands of lines
             lines.append(f"{pad}curve: {len(value)} points, in --json")
-        elif name == "began with":  # each training tells the one that it went on from
+        elif name == "began with":  # each training records the one that it started from
             lines.append(f"{pad}trainings before this one: {_trainings(value)}, in --json")
         elif isinstance(value, dict):
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
@@ -44,7 +44,7 @@ def as_text(facts: dict, indent: int = 0) -> str:
 
 
 def _trainings(card) -> int:
-    """How many trainings a card tells of: its own, and those that it began with."""
+    """How many trainings a card lists: its own, and those that it started from."""
     count = 0
     while isinstance(card, dict):
         card, count = card.get("began with"), count + 1

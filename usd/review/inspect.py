@@ -148,7 +148,7 @@ def _rig(rig: StageRig) -> dict:
 
 
 def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
-    """Hair joints of rigged mesh hair; where there are none, what may be some is told, less readily beside `strands`."""
+    """Hair joints of rigged mesh hair; if there are none, notes on joints that may be, fewer if there are `strands`."""
     meshes = core_meshes(rig)
     try:
         with names_uneven_prims(rig):
@@ -175,7 +175,7 @@ def _height(rig: StageRig) -> float | None:
 
 
 def _grooms(search: HairSearch, curves, border: Border, spoils: list[str], stops: list[str]) -> list[dict]:
-    """Facts about the curves that are hair; what stops one of them does not keep the others from being told."""
+    """Facts about the curves that are hair; a problem with one of them does not hide the others."""
     grooms = []
     for prim in search.filled(curves):
         try:
@@ -188,7 +188,7 @@ def _grooms(search: HairSearch, curves, border: Border, spoils: list[str], stops
 
 
 def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], stops: list[str]) -> dict | None:
-    """Facts about one groom, without a search also where no skeleton is; None where the curves are no hair."""
+    """Facts about one groom; `search` is None if there is no skeleton; returns None if the curves are not hair."""
     placement = Placement(prim)
     curves = UsdGeom.BasisCurves(prim)
     facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
@@ -208,7 +208,7 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
         spoils += undrawn(prim)
     if to_bind is None:
         to_bind = border.to_core @ placement.reference
-        # Without a character, counts and lengths are what is told, and where hair stands changes neither.
+        # Without a character, only counts and lengths are reported, and the position changes neither.
         to_bind[:3, 3] = 0
     groom, beyond = groom_between(prim, to_bind, spoils, drawn=drawn)
     if beyond is not None:
@@ -233,7 +233,7 @@ def _samples(prim, border: Border) -> dict:
 
 
 def _unfit(prim) -> list[str]:
-    """The note on a bake that does not fit what lies over it or below."""
+    """The note on a bake that does not fit the layers above or below it."""
     curves, count = UsdGeom.BasisCurves(prim), int(rest_counts(prim).sum())
     codes = curves.GetPointsAttr().GetTimeSamples()
     if not codes:

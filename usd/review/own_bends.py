@@ -13,15 +13,15 @@ from neuralocks_core.materials import Material
 from neuralocks_core.network_sizes import K
 
 DOUBLED = 0.01
-"""A vertex so much of a mean edge or less from the one before is the same: its direction would be a rounding error."""
+"""A vertex within this share of a mean edge of the previous one is the same: its direction would be a rounding error."""
 
 
 class OwnBends:
-    """The coarse ones among the strands measured.
+    """The coarse strands among those measured.
 
     Args:
         groom: as baked.
-        strands: those measured (S,), each of two distinct points at least.
+        strands: those measured (S,), each with at least two distinct points.
         arc: of the groom's points along their strands (P,) [m].
         rest: the groom's points (P, 3) [m] canonical.
         frames: how many there are.
@@ -51,8 +51,8 @@ class OwnBends:
         """Mean bend energy per unit mass [J/kg] of all strands, by `energies`.
 
         Args:
-            moved: displacements (T, S, K, 3) [m] of the network's vertices, which count for strands that are not coarse.
-            rest: these at rest (S, K, 3) [m].
+            moved: displacements (T, S, K, 3) [m] of the network's vertices, used for the strands that are not coarse.
+            rest: the vertices at rest (S, K, 3) [m].
             material: what they are made of.
         """
         total, mass = 0.0, 0.0

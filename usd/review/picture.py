@@ -57,7 +57,7 @@ def preview(
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the file is no bake, or the picture cannot be made.
+        NeuralocksError: the file is not a bake, or the picture cannot be made.
     """
     for side in size or ():
         check_number("--size", side, *SIDES, whole=True)

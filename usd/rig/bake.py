@@ -85,12 +85,12 @@ def bake_rig(
         skeleton: the only Skeleton prim to bake.
         head: joint that carries the hair.
         frames: as `time_codes.time_codes` takes them; the animation's own samples are always among those written.
-        subframes: samples a frame.
-        loop: the clip repeats, its last sample shows the pose of its first.
+        subframes: samples per frame.
+        loop: the clip repeats, and its last sample shows the pose of its first.
         strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
-        cuts: time codes from which a character is elsewhere and its hair starts anew; found by itself if None.
-        joints: semantic joint -> joint (path, or its last part), where names do not tell.
-        tell: called with the notes that are known before hair is turned, then with the others.
+        cuts: time codes at which a character is suddenly elsewhere and its hair starts anew; detected if None.
+        joints: semantic joint -> joint (path, or its last part), if names are not enough.
+        tell: called with the notes known before hair is turned, then with the others.
         progress: called with (done, total, message).
 
     Raises:
@@ -123,7 +123,7 @@ def bake_rig(
 
     def moved(one: BoundHair) -> MovedHair:
         turns, held = one.turns(loop, strength, counter)
-        said.extend(held + one.hair.source.notes)  # of poses between those of the clip, too
+        said.extend(held + one.hair.source.notes)  # also on poses between those of the clip
         return MovedHair(one.hair, one.codes, turns)
 
     written = _each(bound, moved, still)
@@ -140,17 +140,17 @@ def bake_rig(
 
 
 def _each(characters: list, work: Callable, left: list[NeuralocksError]) -> list:
-    """What `work` gives of each character of which it raises no error; `left` takes the errors of the others.
+    """What `work` returns for each character without an error; `left` takes the errors of the others.
 
     Raises:
-        NeuralocksError: the first one, if there is no character left.
+        NeuralocksError: the first error, if no character is left.
     """
     done, first = [], None
     for character in characters:
         try:
             done.append(work(character))
         except NeuralocksError as error:
-            check()  # for what a stop by the user may have led to
+            check()  # the error may come from a stop by the user
             first = first or (type(error), error.args)  # the error itself would hold the stage
             left.append(of_skeleton(character.path, error))
     if not done:

@@ -20,7 +20,7 @@ from .notes import mirrored_notes, rigged_notes
 from .stage import RiggedHair
 
 STILL = 1e-4
-"""A rotation that differs by less from none is none."""
+"""A rotation that differs by less than this from the identity counts as none."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class BoundHair:
         size: how many times as large as the model's rig this one is.
         trained_name: what the model calls its first joint.
         wanted: the time codes that were asked for, see `time_codes.time_codes`.
-        codes: these and the animation's own samples: the body must come out sample for sample.
+        codes: `wanted` and the animation's own samples, because the body must come out sample for sample.
     """
 
     hair: RiggedHair
@@ -48,7 +48,7 @@ class BoundHair:
         """Bind a model; `frames` and `subframes` are those of `bake.bake_rig`.
 
         Raises:
-            NeuralocksError: it was made for other chains, or a joint that it reads cannot be told; or there are no such frames.
+            NeuralocksError: it was made for other chains, a joint that it reads cannot be identified, or there are no such frames.
         """
         here, trained_name = hair.rig.chains, model.chains.names[0]
         if here.names != model.chains.names:
@@ -66,7 +66,7 @@ class BoundHair:
 
     @property
     def joints(self) -> np.ndarray:
-        """Where the hair joints are in the skeleton, (N,)."""
+        """Indices of the hair joints in the skeleton, (N,)."""
         return self.hair.rig.chains.joints
 
     def turns(self, loop: bool, strength: float, say: Callable[[], None]) -> tuple[np.ndarray, list[str]]:
@@ -108,7 +108,7 @@ class BoundHair:
         ]
 
     def _held(self, carriers: np.ndarray, turns: np.ndarray) -> list[str]:
-        """The note on a head that is held still, with all else that carries hair; see `turns` for what it raises."""
+        """The note on a head that is held still, with all other joints that carry hair; raises as `turns`."""
         rig = self.hair.source
         source, character, joints = rig.source, rig.character, rig.clip.joints
         if np.ptp(joints[:, carriers], axis=0).max() >= 1e-7:
@@ -125,7 +125,7 @@ class BoundHair:
         return [f"{rig.path}: its head joint '{name}' does not move, so the hair is that of a held pose"]
 
     def _renamed(self) -> list[str]:
-        """The note on joints that are called otherwise than in the rig that the model was trained for."""
+        """The note on joints whose names differ from those in the rig that the model was trained for."""
         here = self.model.chains.names[0]
         if here == self.trained_name:
             return []

@@ -27,9 +27,9 @@ VERTICES = 4000
 FRAMES = 48
 """Frames in which distances to the body are measured, evenly over the animation."""
 ROUNDING = 0.01
-"""Less [mm] is no swing and no depth."""
+"""Less than this [mm] counts as no swing and no depth."""
 SETTLED = 2.0
-"""A pose held for so long [s] should have still hair."""
+"""A pose held for this long [s] should have still hair."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class RigCard:
             rigidly (root mean square), `swing_most`: the chain that swings most, `swing_most_mm`; `jitter_mm`: the farthest
             that a vertex goes from one frame to the next once a pose has been held for two seconds, NaN where none is;
             `body` and `body_rigid`: `metrics.penetration` of the animation and of hair carried rigidly, in `body_frames`
-            frames, with `deepest_at` (time code) and `deepest` (chain). Without a body near the hair no such.
+            frames, with `deepest_at` (time code) and `deepest` (chain). Without a body near the hair, these are missing.
         notes: what a user should know.
     """
 
@@ -92,8 +92,8 @@ def evaluate_rig(
 
     Args:
         baked: path of a bake, or of any animated character with hair chains.
-        skeleton, head, chains, joints: as for `read_rigged_hair`; of several skeletons one that a bake moves comes first,
-            and the others are told.
+        skeleton, head, chains, joints: as for `read_rigged_hair`; of several skeletons, one that a bake moves comes first, and a
+            note names the others.
         progress: called with (done, total, message).
 
     Raises:
@@ -159,7 +159,7 @@ class _Posed:
 def _moved(posed: _Posed, moving: np.ndarray, say) -> tuple[np.ndarray, float, dict[int, np.ndarray]]:
     """Mean squared distances (V,) [m^2] of vertices from where they would be carried rigidly; the largest step [mm] of any
     where all other joints have been still for SETTLED, NaN where they never are; and the vertices (2, V, 3) of the rows in
-    which distances to the body are measured. What is not asked for is not kept: long animation has gigabytes of it.
+    which distances to the body are measured. Other vertices are not kept: a long animation has gigabytes of them.
     """
     clip, total, steps, seen, before = posed.clip, 0.0, [], {}, None
     still = metrics.held(clip.joints[:, ~moving], clip.times)
@@ -176,7 +176,7 @@ def _moved(posed: _Posed, moving: np.ndarray, say) -> tuple[np.ndarray, float, d
 
 
 def _depths(posed: _Posed, seen: dict[int, np.ndarray], locks: list[str], say) -> dict:
-    """What lies in the body of the vertices that were `seen`, as the animation moves them and as they would be carried rigidly."""
+    """How far the `seen` vertices are inside the body, as the animation moves them and as they would be carried rigidly."""
     rows, at_rest, measured = list(seen), posed.distances(None, posed.at_rest), []
     with ThreadPoolExecutor(cores()) as pool:
         for done, distance in enumerate(pool.map(lambda row: posed.distances(row, seen[row].reshape(-1, 3)), rows)):
@@ -201,7 +201,7 @@ def _hair_vertices(hair: RiggedHair, moving: np.ndarray) -> np.ndarray:
 
 
 def _stiff(character: Character, joints: np.ndarray, moving: np.ndarray) -> np.ndarray:
-    """World joint transforms (J, 4, 4) in which hair joints are to their parents as in bind pose."""
+    """World joint transforms (J, 4, 4) in which hair joints relate to their parents as in the bind pose."""
     bind, parents, result = character.skeleton.bind, character.skeleton.parents, joints.copy()
     for joint in np.flatnonzero(moving):  # parents come first
         up = parents[joint]

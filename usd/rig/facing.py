@@ -9,13 +9,13 @@ from neuralocks_core.character import Character
 from ..skel.stage_rig import StageRig
 
 ASKEW = 2.0
-"""A bind pose that faces further off a stage's axis [degrees] is told."""
+"""A bind pose that faces farther off a stage's axis than this [degrees] gets a note."""
 AHEAD = 0.02
-"""Toes and eyes lie further ahead of ankles and head joint [m]."""
+"""Toes and eyes are farther ahead of ankles and head joint than this [m]."""
 
 
 def facing_notes(rig: StageRig) -> list[str]:
-    """The note on a bind pose that faces askew, or backwards: the network's axes go by where left and right are."""
+    """The note on a bind pose that faces askew, or backwards: the network's axes follow from where left and right are."""
     character, names = rig.character, rig.source.names
     if character.sides is None:
         return []
@@ -36,7 +36,7 @@ def facing_notes(rig: StageRig) -> list[str]:
 
 
 def _behind(character: Character) -> str:
-    """What points away from where the character faces, "toes" or "eyes"; nothing where either points there."""
+    """What points away from where the character faces, "toes" or "eyes"; nothing if either points ahead."""
     bind, found = character.skeleton.bind[:, :3, 3] @ character.facing.T, {}
     for side in ("left", "right"):
         foot, eye = (character.humanoid.get(f"{side}_{part}") for part in ("foot", "eye"))

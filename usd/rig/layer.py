@@ -42,7 +42,7 @@ class MovedHair:
 
 
 def write_rig_layer(characters: list[MovedHair], shot: Path, out: Path) -> list[str]:
-    """Write the layer; nothing under `out` but a complete file.
+    """Write the layer, completely or not at all.
 
     Args:
         characters: of one shot.
@@ -106,7 +106,7 @@ def _write_animation(layer: Sdf.Layer, character: MovedHair) -> str:
 
 
 def kept_hair(source: JointSource, joints: np.ndarray) -> dict[str, int]:
-    """Joints -> columns of an earlier bake that moves them and was of other hair than `joints` (N,)."""
+    """Joints -> columns of an earlier bake that moves them and was made for other hair than `joints` (N,)."""
     if source.copied is None:
         return {}
     moved, listed = {source.names[j] for j in joints}, UsdSkel.Animation(source.copied).GetJointsAttr().Get()
@@ -140,7 +140,7 @@ def _rest_channels(source: JointSource, order: list[str]) -> dict:
     still = (Gf.Vec3f(0), Gf.Quatf(1), Gf.Vec3h(1))
     rows = [still] * len(order)
     for row, name in enumerate(order):
-        if name in place:  # an animation may name joints that the skeleton has not
+        if name in place:  # an animation may name joints that the skeleton does not have
             j = place[name]
             shift, scale = (map(float, values) for values in (source.rest[j, :3, 3], size[j]))
             rows[row] = (Gf.Vec3f(*shift), Gf.Quatf(*map(float, turn[j])), Gf.Vec3h(*scale))
@@ -157,7 +157,7 @@ def _joined(attribute, code, rest: list) -> list:
 
 
 def _has_default(attribute) -> bool:
-    """Whether a channel has a value at no time, which is seen where nobody asks for one."""
+    """Whether a channel has a default value, which is seen if nobody asks for a time."""
     return bool(attribute) and attribute.Get(Usd.TimeCode.Default()) is not None
 
 

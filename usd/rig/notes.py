@@ -17,7 +17,7 @@ from .outside import left_out_notes, outside_notes
 from .stage import RiggedHair, core_meshes
 
 RIG_JOINTS = rig_spec().pose_joints
-"""Semantic joints that rig models read beside the head."""
+"""Semantic joints that rig models read besides the head."""
 
 
 def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
@@ -25,7 +25,7 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
 
     Args:
         source: the character.
-        pose_joints: semantic joints that the network reads beside the head.
+        pose_joints: semantic joints that the network reads besides the head.
     """
     found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source), *lies_down(source)]
     frames = source.border.frame_notes(source.path)
@@ -33,7 +33,7 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
 
 
 def chain_notes(hair: RiggedHair, patterns: list[str] | None) -> list[str]:
-    """What a user should know about the choice of chains that was made for them; of their own, by patterns, they know."""
+    """What a user should know about automatically chosen chains; those chosen by patterns are the user's own."""
     return [] if patterns else left_out_notes(hair.source, core_meshes(hair.source), hair.rig.chains)
 
 

@@ -13,8 +13,8 @@ from ..skel.stage_rig import StageRig
 
 
 def outside_notes(source: StageRig) -> list[str]:
-    """The note on joints that are named like hair and drive skin, but hang from the neck, say, beside the head. Those of another
-    head in the skeleton have a note of their own.
+    """The note on joints that are named like hair and drive skin, but are not below the head, for example below the neck. Those of
+    another head in the skeleton have their own note.
     """
     names, character = source.source.names, source.character
     drives = np.zeros(len(names), bool)
@@ -39,7 +39,7 @@ def outside_notes(source: StageRig) -> list[str]:
 
 
 def left_out_notes(source: StageRig, meshes: list[SkinnedMesh], chains: HairChains) -> list[str]:
-    """The note on chains below the head that were not found, where some were found by themselves.
+    """The note on chains below the head that were not found, if others were found automatically.
 
     Args:
         source: the character.
@@ -56,7 +56,7 @@ def left_out_notes(source: StageRig, meshes: list[SkinnedMesh], chains: HairChai
 
 
 def unnamed_notes(source: StageRig, meshes: list[SkinnedMesh], strands: bool) -> list[str]:
-    """The note on what drives skin below the head, where none of it was found to be hair, and why it was not.
+    """The note on joints below the head that drive skin, if none was recognised as hair, and why.
 
     Args:
         source: the character.

@@ -11,7 +11,7 @@ from neuralocks_core.rotation import transformed
 from .stage import RiggedHair
 
 MOST = 0.3
-"""Share of its vertices that are hair from which all of a connected piece of mesh is."""
+"""If at least this share of a connected mesh piece's vertices is hair, all of the piece is."""
 
 
 def rigged_scene(rigged: RiggedHair) -> Scene:

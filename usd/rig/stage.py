@@ -30,7 +30,7 @@ from .uneven import names_uneven_prims
 BAKED = "NeuralocksHair"
 """Name of the SkelAnimation that a bake writes."""
 _FEW = 4
-"""So many prims are named in an error."""
+"""Up to this many prims are named in an error."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class RiggedHair:
         stage: the shot.
         border: its units.
         source: skeleton, body and clip as read.
-        rig: hair and body apart.
-        others: further skeletons with hair chains, of which this one was taken.
+        rig: hair and body, separated.
+        others: other skeletons with hair chains, from which this one was chosen.
     """
 
     stage: Usd.Stage = field(repr=False)
@@ -63,8 +63,8 @@ def read_rigged_hair(path: str | Path, *, baked_first: bool = False, **options) 
 
     Args:
         path: USD file.
-        baked_first: of several skeletons with hair chains take one that a bake moves, or the first; else they are refused.
-        options: see `read_rigged_hairs`, as what it raises.
+        baked_first: if several skeletons have hair chains, take one that a bake moves, or the first; otherwise they are refused.
+        options: see `read_rigged_hairs`, also for what it raises.
 
     Raises:
         NeuralocksError: there are several.
@@ -102,14 +102,14 @@ def read_rigged_hairs(
         skeleton: path of the only Skeleton prim to read.
         head: joint that carries the hair, if it is not named like a head.
         chains: name patterns of the chains' first joints, instead of finding them.
-        joints: semantic joint -> joint path or its last part, where names do not tell.
+        joints: semantic joint -> joint path or its last part, if names are not enough.
         all_shapes: keep blend shapes that the animation does not use (training draws random ones).
         cuts: as for `stage.read_shot`.
         unbaked: as for `read_rig`.
-        model: a model's chains, in whatever names they have here: no guess is made then about which joints are hair.
+        model: a model's chains, whatever their names here; then nothing is guessed about which joints are hair.
 
     Raises:
-        NoHairChains: of a model's chains there is no joint.
+        NoHairChains: there is no joint of the model's chains.
         NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
     """
     stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
@@ -132,14 +132,14 @@ def read_rigged_hairs(
             with names_uneven_prims(source):
                 wanted = chains if model is None else _of_model(model, source.character)
                 rig = assemble_rig(source.character, core_meshes(source), wanted)
-            if model is not None:  # else it is checked of the one that is chosen
+            if model is not None:  # otherwise it is checked for the chosen one
                 check_orients(source, rig.chains)
         except NeuralocksError as error:
-            check()  # for what a stop by the user may have led to
+            check()  # the error may come from a stop by the user
             errors.append((str(prim.GetPath()), _is_hairy(prim, model), type(error), _with_path(prim, error)))
             continue
         found.append(RiggedHair(stage, border, source, rig))
-    # Hair may have a skeleton of its own beside the body's, which would only be told to have none.
+    # Hair may have its own skeleton besides the body's; the error should not be that the body's has no hair.
     hairy = [error for error in errors if error[1]]
     if not found:
         *_, kind, text = (hairy or errors)[0]
@@ -148,7 +148,7 @@ def read_rigged_hairs(
 
 
 def of_skeleton(path: str, error) -> NeuralocksError:
-    """What is wrong with one of several skeletons, with its path before it."""
+    """What is wrong with one of several skeletons, prefixed with its path."""
     text = str(error)
     return NeuralocksError(text if text.startswith(f"{path}: ") else f"{path}: {text}")
 
@@ -160,7 +160,7 @@ def _is_hairy(prim: Usd.Prim, model: HairChains | None) -> bool:
 
 
 def _of_model(model: HairChains, character: Character) -> HairChains:
-    """A model's chains where they lie in a character, by the names that they have there."""
+    """A model's chains in a character, by the names that they have there."""
     names, below = character.skeleton.names, character.skeleton.below(character.head)
     chains = model.named_as(names, below)
     if not {leaf(name) for name in names} & set(chains.names):
@@ -186,7 +186,7 @@ def core_meshes(source: StageRig) -> list[SkinnedMesh]:
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:
-    """Refuse a pattern of `--chains` that stands for none of the chains found.
+    """Refuse a pattern of `--chains` that matches none of the chains found.
 
     Raises:
         NeuralocksError: names it.

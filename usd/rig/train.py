@@ -41,16 +41,16 @@ def train_rig(
     Args:
         character: USD file.
         out: `.neuralocks` file to write.
-        dynamic: learn lag, swing and settling from a simulation of the chains; else held poses, from the energy alone.
+        dynamic: learn lag, swing and settling from a simulation of the chains; otherwise held poses, from the energy alone.
         seconds, steps, hidden, seed: see `training.rig.static.train_static` and `training.rig.dynamic.train_dynamic`, whose
-            defaults hold for what is None.
+            defaults replace None.
         clips: see the latter.
         material: fields of `rig.rods.RigMaterial`.
         chains, head, skeleton, joints: see `read_rigged_hair`.
         command: for the model card.
-        early: write the model before its report is measured, too, which takes minutes: who stops that has the model.
-        tell: called with notes for the user before the training, whose minutes some of them would save, and with what the
-            report says against the model at last.
+        early: also write the model before its report is measured, which takes minutes: whoever stops that has the model.
+        tell: called with notes for the user before training, since some may save its minutes, and at the end with what the report
+            says against the model.
         progress: called with (done, total, message).
 
     Returns:
@@ -105,7 +105,7 @@ def train_rig(
 
 
 def _card(who: Character, model, name: str) -> dict:
-    """What the model's card tells of the character that it was trained for."""
+    """What the model's card says about the character that it was trained for."""
     read = {name: who.skeleton.names[who.humanoid.nearest(name)] for name in ("head", *model.spec.pose_joints)}
     return {
         "character": name,

@@ -15,7 +15,7 @@ from ..skel.stage_rig import StageRig
 
 @contextmanager
 def names_uneven_prims(source: StageRig) -> Iterator[None]:
-    """Turns an error about a joint that is scaled unevenly into one that names the prim above, where that has the scale."""
+    """Turns an error about a joint that is scaled unevenly into one that names the prim above, if that has the scale."""
     try:
         yield
     except UnevenJoint:

@@ -11,22 +11,22 @@ from ..skel.stage_rig import StageRig
 from .seat import CLEARLY, Seat, kinship
 
 SAME = 0.01
-"""Joints of two skeletons at most so far apart [m] are one."""
+"""Joints of two skeletons at most this far apart [m] are one."""
 UPPER = ("head", "neck", "upper_chest", "chest")
-"""Joints by which one person is known."""
+"""Joints by which the same person is recognised."""
 
 
 def one_of_alike(prim: Usd.Prim, seats: list[Seat], notes: list[str]) -> Seat:
-    """The seat on the body among whose prims the groom is; else on the one whose name it shares, on which it sits by the
-    likelier way, or to which it is clearly nearer.
+    """The seat on the body whose prims the groom is among; otherwise on the body that shares its name, that it sits on by a
+    likelier way, or that is clearly nearer.
 
     Args:
         prim: a groom.
         seats: on bodies that are alike; not empty.
-        notes: that another body would do by a less likely way is added here.
+        notes: a note is added here if another body would do, by a less likely way.
 
     Raises:
-        NeuralocksError: several are as likely.
+        NeuralocksError: several are equally likely.
     """
     kin = max(kinship(prim, seat.rig.source.prim) for seat in seats)
     likely = _sharing_a_name(prim, [seat for seat in seats if kinship(prim, seat.rig.source.prim) == kin])

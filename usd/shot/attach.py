@@ -26,9 +26,9 @@ from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, s
 from .seat_notes import astray, lies_off_skin, not_pinned, upside_down
 
 ON_HEAD = 0.3
-"""Roots no farther than this, and than half the trunk is long, from a head are on it, whatever else is there [m]."""
+"""Roots within this distance of a head [m], and within half the length of the trunk, are on it, whatever else is there."""
 REACH = 1.0
-"""Roots farther than this and than the trunk is long from a head are not that head's hair: grass, cables [m]."""
+"""Roots farther from a head than this [m], and than the length of the trunk, are not its hair: grass, cables."""
 ALIKE = 2e-3
 """Bodies are alike if hair sits on them equally well up to this [m]."""
 
@@ -39,15 +39,15 @@ class Attachment:
 
     Attributes:
         rig: the skeleton that carries it.
-        character: the rig's character, with the joint that carries the groom: its head, one below it, or else the one that
-            takes the head's part.
+        character: the rig's character, with the joint that carries the groom: its head, one below it, or the one that takes the
+            head's role.
         to_bind: the prim's own space to bind world [m], (4, 4).
         how: the carrying joint and how it was found, in words.
         skinned: whether UsdSkel would deform the prim itself.
-        at_default: the same way of points that would be authored at the default time, (4, 4), where the shot has none
-            but those of a moving cache; else None.
-        far: distance of the roots from the joint [m] where neither a binding nor a skin below says that it
-            carries them and they lie out of its reach; else 0.
+        at_default: the same for points that would be authored at the default time, (4, 4), if the shot only has those of a moving
+            cache; otherwise None.
+        far: distance of the roots from the joint [m], if they are out of its reach and neither a binding nor a skin below says that
+            it carries them; otherwise 0.
         drawn: whether the hair begins where its curves are drawn, not at a point before.
     """
 
@@ -74,7 +74,7 @@ def attach(
         notes: what a user should know is added here.
 
     Raises:
-        NeuralocksError: nothing, or no single one, can carry it.
+        NeuralocksError: nothing can carry it, or several things can.
     """
     path = str(prim.GetPath())
     bound = bound_skeleton(prim)
@@ -109,8 +109,8 @@ def attach(
 
 
 def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement, seated: bool) -> tuple[str, str] | None:
-    """The joint that a binding says carries the groom, and whose binding that is; None where none says so. The binding of
-    the mesh on which the groom sits counts where it is `seated`.
+    """The joint that carries the groom according to a binding, and whose binding that is; None if no binding says. The binding of
+    the mesh on which the groom sits counts if it is `seated`.
 
     Raises:
         NeuralocksError: a binding cannot be used.
@@ -141,13 +141,13 @@ def rig_joint(found: Attachment) -> str:
 
 
 def off_head(found: Attachment) -> bool:
-    """Whether the carrying joint takes the part of a head that the rig has elsewhere, as it does for fur on a chest."""
+    """Whether the carrying joint takes the role of the head while the rig has one elsewhere, as for fur on a chest."""
     own = found.rig.character.humanoid.get("head")
     return own not in (None, found.character.head) and found.character.head != head_by_name(found.rig)
 
 
 def on_head(prim: Usd.Prim, found: Attachment) -> bool:
-    """Whether the roots are where the head of a human is, about the carrying joint."""
+    """Whether the roots are around the carrying joint where a human head would be."""
     return _away(some_ends(prim), found.character, found.to_bind) <= max(ON_HEAD, _trunk(found.rig) / 2)
 
 
@@ -187,12 +187,12 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
     when = moment(prim)
     places = {rig.path: ways(rig, None, placement, when) for rig in able}
     if when is None and all(away(rig, way) > _reach(rig) for rig in able for way in places[rig.path]):
-        # Where no skin can tell, only what is on the head of a moment is hair: much else stands beside it.
+        # Without skin, only what is on the head at that moment is hair: much else stands near it.
         for rig in (rig for rig in able if not rig.meshes):
             posed = ways(rig, None, placement, likely=False)
             places[rig.path] += [way for way in posed if away(rig, way) < _trunk(rig) / 2]
     far = [(min(away(rig, way) for way in places[rig.path]), rig) for rig in able]
-    # The one whose head is nearest to the roots; where that is not clear, the one among whose prims the groom is.
+    # The one whose head is nearest to the roots; if that is not clear, the one whose prims the groom is among.
     least = min(distance for distance, _ in far)
     close = [(distance, rig) for distance, rig in far if distance <= 2 * least]
     kin = max(kinship(prim, rig.source.prim) for _, rig in close)
@@ -218,7 +218,7 @@ def _away(roots: np.ndarray, character: Character, to_bind: np.ndarray) -> float
 
 
 def _reach(rig: StageRig) -> float:
-    """How far from the carrying joint what nothing else says to be hair may lie [m]."""
+    """How far from the carrying joint curves may be [m] if nothing else says that they are hair."""
     return max(REACH, _trunk(rig))
 
 
@@ -232,7 +232,7 @@ def _by_own_binding(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> tuple
     """The joint that carries a groom which is bound to the rig, why, the share (J,) of each joint in its roots, and the note
     on strands that run from tip to root, whose roots are their last points.
 
-    What hangs farther down is weighted as a rigger would have it move without simulation, by the chest or an arm.
+    Points farther down are weighted as a rigger wants them to move without simulation, with the chest or an arm.
     """
     indices, weights = joint_influences(prim, len(rest_points(prim)), rig.source)
     turned = upside_down(prim, rig, to_bind)

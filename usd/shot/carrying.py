@@ -14,13 +14,13 @@ from ..skel.stage_rig import StageRig
 from .seat import some_places
 
 STILL = 1e-4
-"""What moves by less [m], and turns by less, against something goes with it."""
+"""What moves by less than this [m], and turns by less, relative to something moves with it."""
 MOST = 0.75
 """Share of the skin under a groom that must follow its joint, or the rest of it visibly leaves the skin."""
 
 
 def carrying_joint(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:
-    """The joint that carries, and why: the head where most of the skin follows it or what hangs below it."""
+    """The joint that carries, and why: the head if most of the skin follows it or a joint below it."""
     names = rig.source.names
     best = int(shares.argmax())
     head = rig.character.humanoid.get("head")
@@ -33,9 +33,8 @@ def carrying_joint(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tu
 
 
 def followed_joint(rig: StageRig, placement: Placement) -> tuple[int, np.ndarray] | None:
-    """The head, or the joint below it, that a prim's own animated transform follows, as that of hair which was made the child of
-    a bone does, and the way from there to bind world (4, 4) [m]; None where it follows none, or others as well, as where all of
-    the character moves as one.
+    """The head, or the joint below it, that a prim's own animated transform follows, as for hair parented to a bone, and the prim's
+    transform to bind world (4, 4) [m]. None if it follows none, or other joints too, as when the whole character moves as one.
     """
     head, character = rig.character.humanoid.get("head"), rig.character
     if head is None or not placement.samples:
@@ -55,7 +54,7 @@ def followed_joint(rig: StageRig, placement: Placement) -> tuple[int, np.ndarray
 
 
 def _still(places: np.ndarray) -> bool:
-    """Whether transforms (T, 4, 4), which end in metres, are one and the same."""
+    """Whether transforms (T, 4, 4) to metres are all the same."""
     size = np.abs(places[:, :3, :3]).max()
     return bool(
         np.ptp(places[:, :3, 3], axis=0).max() < STILL and np.ptp(places[:, :3, :3] / size, axis=0).max() < STILL
@@ -69,12 +68,12 @@ def joint_shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.
 
 
 def carried_by(rig: StageRig, joint: int) -> Character:
-    """The rig's character with the joint that carries a groom: its head, one below it, or else one that takes its part."""
+    """The rig's character with the joint that carries a groom: its head, one below it, or one that takes its role."""
     head, skeleton = rig.character.humanoid.get("head"), rig.character.skeleton
     if head == joint:
         return rig.character
     below = head is not None and skeleton.below(head)[joint]
-    # A neck that the user calls the head does not make a part of it of the head that names find.
+    # If the user calls the neck the head, the head found by name does not become a part of it.
     if below and not ("head" in rig.by_hand and joint == head_by_name(rig)):
         return replace(rig.character, carrier=joint)
     return replace(rig.character, humanoid=_humanoid(rig, head=skeleton.names[joint]))
@@ -83,7 +82,7 @@ def carried_by(rig: StageRig, joint: int) -> Character:
 def spread_over(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[str]:
     """The note on hair that one joint cannot carry: fur all over a body."""
     names = [leaf(name) for name in rig.source.names]
-    # What hangs below a head is its face; what hangs below a spine is everything.
+    # Joints below a head are its face; joints below a spine are everything.
     own = (
         rig.character.skeleton.below(joint)
         if joint == rig.character.humanoid.get("head")
@@ -101,7 +100,7 @@ def spread_over(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> lis
 
 
 def head_by_name(rig: StageRig) -> int | None:
-    """The head, whatever was given by hand."""
+    """The head by name, whatever the user gave."""
     try:
         return _humanoid(rig)["head"]
     except NoHead:
@@ -109,7 +108,7 @@ def head_by_name(rig: StageRig) -> int | None:
 
 
 def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
-    """Whether a joint below the head never moves against it."""
+    """Whether a joint below the head never moves relative to it."""
     joints = rig.clip.joints
     relative = np.linalg.inv(joints[:, head]) @ joints[:, joint]
     return bool(np.abs(relative - relative[0]).max() < 1e-4)

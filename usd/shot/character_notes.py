@@ -26,13 +26,13 @@ AROUND = 0.25
 """A mesh with some points this near to a head's joint [m] is the head's, or on it."""
 SOME = 20
 UNEVEN = 1.02
-"""Hair that is stretched so many times more along one axis than along another is told: its strands change their lengths."""
+"""Hair stretched this many times more along one axis than along another gets a note: its strands change their lengths."""
 FLATTENED = 10
-"""Nobody needs to know how many more times than that: nearly flat, it would be millions of percent."""
+"""Larger ratios are not told exactly: for a nearly flat scale, it would be millions of percent."""
 
 
 def lies_down(rig: StageRig) -> list[str]:
-    """The note on a character that lies in its bind pose, as one does that counts another axis as up than its stage."""
+    """The note on a character that lies down in its bind pose, as one does whose up axis is not its stage's."""
     character = rig.character
     lying, sure = lies(character.skeleton.bind[:, :3, 3], character.humanoid, np.array([0.0, 1.0, 0.0]))
     foreign = rig.border.foreign(rig.source.prim.GetAttribute("bindTransforms"), axis_only=True)
@@ -45,7 +45,7 @@ def lies_down(rig: StageRig) -> list[str]:
 
 
 def untrained(rig: StageRig) -> list[str]:
-    """The note on a character that carries hair and has another size than a network was trained on."""
+    """The note on a character that carries hair and has a size that no network was trained on."""
     if unlikely_head(rig):
         return []  # told already
     measures = body_measures(rig.character, rig.clip.shape[0])
@@ -62,10 +62,10 @@ def untrained(rig: StageRig) -> list[str]:
 def unevenly_scaled(rig: StageRig) -> list[str]:
     """The note on what carries hair and stretches it more along one axis than along another in any frame.
 
-    What scales the whole character is in its bind pose, too, so that hair is stretched as far as its head turns in it.
+    Scale of the whole character is in its bind pose, too, so hair is only stretched as far as its head turns within it.
     """
     ratio = _unevenness(rig.character.carrying(rig.clip.joints))
-    frame = int(ratio.round(4).argmax())  # the first of those that are alike
+    frame = int(ratio.round(4).argmax())  # the first of those that are equal
     if ratio[frame] < UNEVEN:
         return []
     code = rig.time_codes[frame]
@@ -81,7 +81,7 @@ def unevenly_scaled(rig: StageRig) -> list[str]:
 
 
 def uneven(transform: np.ndarray, least: float = UNEVEN) -> bool:
-    """Whether a transform (4, 4) scales so many times more along one axis than along another."""
+    """Whether a transform (4, 4) scales at least this many times more along one axis than along another."""
     sizes = np.linalg.svd(transform[:3, :3], compute_uv=False)
     return bool(sizes[0] >= least * sizes[2])
 
@@ -94,11 +94,11 @@ def _unevenness(transforms: np.ndarray) -> np.ndarray:
 
 
 def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[str]:
-    """The notes on characters that move no mesh of which hair could be kept out, and on the meshes that may be meant.
+    """The notes on characters without a mesh that hair could be kept out of, and on the meshes that may be meant.
 
     Args:
         rigs: skeletons that carry hair.
-        others: all of the stage; what is told of a character in several skeletons is not told here.
+        others: all skeletons of the stage; a character in several skeletons has its own note elsewhere.
     """
     bare = [rig for rig in rigs if rig.character.body is None and not partial_body(rig, others)]
     if not bare:
@@ -112,7 +112,7 @@ def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[s
 
 
 def _unused_meshes(stage: Usd.Stage) -> tuple[dict[str, list[Usd.Prim]], list[Usd.Prim]]:
-    """Meshes that a skeleton moves unseen, by its path, and those that are seen and that none moves."""
+    """Hidden meshes that a skeleton moves, by its path, and visible ones that no skeleton moves."""
     hidden, loose = {}, []
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
         if prim.IsA(UsdGeom.Mesh):
@@ -125,7 +125,7 @@ def _unused_meshes(stage: Usd.Stage) -> tuple[dict[str, list[Usd.Prim]], list[Us
 
 
 def _meant(hidden: list[Usd.Prim], loose: list[Usd.Prim], rig: StageRig) -> str:
-    """Which meshes may be its body, and what to do; '' where none is found."""
+    """Which meshes may be its body, and what to do; '' if none is found."""
     if hidden:
         return f"{_named(hidden)}, bound to it, {_is(hidden)} not drawn: show the body"
     when = beginnings(rig)[-1]

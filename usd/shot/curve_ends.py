@@ -34,7 +34,7 @@ class Beyond:
     hair: np.ndarray
 
     def left_out(self, groom: Groom) -> Groom:
-        """A groom with all P points, without these."""
+        """A groom with all P points, without the points beyond."""
         counts = groom.counts - np.bincount(groom.strand_of_point[~self.hair], minlength=groom.strand_count)
         each = len(groom.widths) == len(groom.points)
         return replace(
@@ -46,13 +46,13 @@ class Beyond:
 
 
 def groom_between(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str], *, drawn: bool) -> tuple[Groom, Beyond | None]:
-    """What `read_groom` gives; or, if hair begins where it is drawn, that much of it, and which points it lacks."""
+    """What `read_groom` gives; if hair begins where it is drawn, only the drawn part, and which points it lacks."""
     groom, beyond = read_groom(prim, to_bind, notes), beyond_ends(prim) if drawn else None
     return (groom if beyond is None else beyond.left_out(groom)), beyond
 
 
 def beyond_ends(prim: Usd.Prim) -> Beyond | None:
-    """The points beyond the ends of a BasisCurves; None where there are none, and where its counts do not fit its points."""
+    """The points beyond the ends of a BasisCurves; None if there are none, or if its counts do not fit its points."""
     curves, tokens = UsdGeom.BasisCurves(prim), UsdGeom.Tokens
     if curves.GetTypeAttr().Get() != tokens.cubic or curves.GetWrapAttr().Get() != tokens.nonperiodic:
         return None
@@ -72,7 +72,7 @@ def beyond_ends(prim: Usd.Prim) -> Beyond | None:
 
 
 def undrawn(prim: Usd.Prim) -> list[str]:
-    """The note on strands of a cubic BasisCurves of whose segments some would lack points (UsdGeomBasisCurves, "Vertex count")."""
+    """The note on strands of a cubic BasisCurves with incomplete segments (UsdGeomBasisCurves, "Vertex count")."""
     curves, tokens = UsdGeom.BasisCurves(prim), UsdGeom.Tokens
     basis, wrap = curves.GetBasisAttr().Get(), curves.GetWrapAttr().Get()
     if curves.GetTypeAttr().Get() != tokens.cubic or wrap == tokens.periodic:
@@ -83,7 +83,7 @@ def undrawn(prim: Usd.Prim) -> list[str]:
     else:
         least = 2 if wrap == tokens.pinned else LEAST
         odd, fitting = counts < least, f"{least} or more"
-    odd &= counts > 1  # a lone point is told as what does not move
+    odd &= counts > 1  # a lone point gets the note on what does not move
     if not odd.any():
         return []
     found = list(map(str, np.unique(counts[odd])))
@@ -95,8 +95,8 @@ def undrawn(prim: Usd.Prim) -> list[str]:
 
 
 def ends(prim: Usd.Prim, *, last: bool = False, beyond: Beyond | None = None) -> np.ndarray:
-    """Which points (n,) are strands' first or last ones, of all but those `beyond`; the very first one alone where the counts
-    do not fit the points.
+    """Which points (n,) are strands' first or last ones, not counting those `beyond`; only the very first one if the counts do not
+    fit the points.
     """
     points, counts = len(rest_points(prim)), rest_counts(prim)
     found = np.cumsum(counts) - (1 if last else counts)

@@ -20,7 +20,7 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
     """BasisCurves prims in stage order; only those `wanted` (paths; a parent stands for all below it).
 
     Raises:
-        NeuralocksError: a wanted path is no groom.
+        NeuralocksError: a wanted path is not a groom.
     """
     every = [
         p for p in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.BasisCurves)
@@ -51,10 +51,10 @@ def without_points(prims: list[Usd.Prim]) -> list[Usd.Prim]:
 
 
 def rest_points(prim: Usd.Prim) -> np.ndarray:
-    """(P, 3) float32 points at rest in the prim's own space and units: those that Blender's live view kept, where there are.
+    """(P, 3) float32 points at rest in the prim's own space and units: those that Blender's live view kept, if any.
 
     Raises:
-        NeuralocksError: there are none, or not in three coordinates.
+        NeuralocksError: there are none, or they do not have three coordinates.
     """
     attribute = UsdGeom.BasisCurves(prim).GetPointsAttr()
     points = as_numbers(attribute, "point3f[]", rest_value(attribute), np.float32)
@@ -73,7 +73,7 @@ def rest_counts(prim: Usd.Prim) -> np.ndarray:
 
 
 def moment(prim: Usd.Prim) -> float | None:
-    """Time code of the points at rest, where they are taken from one sample of a moving cache."""
+    """Time code of the points at rest, if they are taken from one sample of a moving cache."""
     if _kept(prim) is not None:
         return None
     points = UsdGeom.BasisCurves(prim).GetPointsAttr()
@@ -139,7 +139,7 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
 
 
 def _kept(prim: Usd.Prim) -> np.ndarray | None:
-    """(P, 3) float32 points at rest that the Blender add-on kept beside live ones; None where it did not, or not for all."""
+    """(P, 3) float32 points at rest that the Blender add-on kept beside live ones; None if it did not, or not for all."""
     copy = _copy(prim)
     if copy is None:
         return None
@@ -188,7 +188,7 @@ def _widths_attribute(curves: UsdGeom.BasisCurves) -> Usd.Attribute:
 
 
 def _widths(curves: UsdGeom.BasisCurves, counts: np.ndarray, scale: float, notes: list[str]) -> np.ndarray | None:
-    """Widths [m] of points, strands or all: (P,), (S,) or (1,); None if the curves have none that can be meant."""
+    """Widths [m] of points, strands or all: (P,), (S,) or (1,); None if the curves have none that make sense."""
     attribute = _widths_attribute(curves)
     primvar = UsdGeom.Primvar(attribute)
     try:
@@ -238,7 +238,7 @@ def _places(each: np.ndarray) -> np.ndarray:
 def _per_strand(prim: Usd.Prim, names, counts: np.ndarray, width: int) -> np.ndarray | None:
     """A primvar of each strand (S, width), or (S,) for width 1: the first of `names` that fits.
 
-    One value counts for all strands; of values of each vertex, as some tools write them, the root's is taken.
+    One value counts for all strands; of values per vertex, which some tools write, the root's is taken.
     """
     api, strands = UsdGeom.PrimvarsAPI(prim), len(counts)
     for name in names:

@@ -5,7 +5,7 @@ import numpy as np
 
 
 def gaps(codes: list[float], frame: float, first: float, last: float) -> list[str]:
-    """Where samples are missing, in words such as "between 5 and 9"; steps of several frames are none.
+    """Where samples are missing, in words such as "between 5 and 9"; regular steps of several frames are not gaps.
 
     Args:
         codes: time codes of a groom's samples, ascending.
@@ -16,6 +16,6 @@ def gaps(codes: list[float], frame: float, first: float, last: float) -> list[st
     steps = np.diff(frames)
     usual = np.median(steps) if len(steps) > 1 else frame
     found = [f"between {frames[i]:g} and {frames[i + 1]:g}" for i in np.flatnonzero(steps > 1.5 * usual)]
-    missed = usual * (1 - 1e-6)  # a shot need not begin and end with a frame, but less than a step of it is none
+    missed = usual * (1 - 1e-6)  # a shot may begin and end off a frame; less than a step is not a gap
     found = ([f"before {codes[0]:g}"] if codes[0] - first >= missed else []) + found
     return found + ([f"after {codes[-1]:g}"] if last - frames[-1] >= missed else [])

@@ -28,24 +28,24 @@ def groom_notes(prim: Usd.Prim, groom: Groom, border: Border) -> list[str]:
             f"{path}: {still} of {groom.strand_count} strands have no two distinct points; they follow the head rigidly"
         )
     longest = float(spread.max())
-    if longest > 2.5 or 0 < longest < 0.002:  # points alone tell nothing of a unit
+    if longest > 2.5 or 0 < longest < 0.002:  # points alone say nothing about a unit
         remedy = border.foreign(prim.GetAttribute("points")) or "; check the stage's metersPerUnit"
         notes.append(f"{path}: the longest strand reaches {longest:.3g} m{remedy}")
     return notes
 
 
 def no_points(path: str) -> str:
-    """The note on a prim of curves without points, beside others that have some."""
+    """The note on a prim of curves without points, if others have some."""
     return f"{path}: the curves have no points; left out"
 
 
 def stands_still(path: str, rig: StageRig) -> str:
-    """The note on a groom whose character is not animated, beside others that are."""
+    """The note on a groom whose character is not animated, if others are."""
     return f"{path}: {rig.path}, which carries it, has no animation; left out"
 
 
 def another_carries(path: str, rig: StageRig) -> str:
-    """The note on a groom that another skeleton carries than the one the user named."""
+    """The note on a groom that is carried by another skeleton than the one the user named."""
     return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
 
 
@@ -62,8 +62,8 @@ def far_from_named(prim: Usd.Prim, found: Attachment) -> str:
 
 
 def unusable_skeleton(path: str, own: str, bound: bool, named: bool = False) -> str:
-    """The note on a groom whose own skeleton cannot be used, as another note says: nothing else may carry it. Why it is
-    refused, where its user named it.
+    """The note on a groom whose own skeleton cannot be used, as another note says: nothing else may carry it. If the user named it,
+    why it is refused.
     """
     how, unbound = ("is bound to", "unbind the hair and ") if bound else ("lies on the character of", "")
     fact = "cannot be used, as neuralocks inspect explains" if named else "cannot be used, and is left out with it"

@@ -29,12 +29,12 @@ class HairSearch:
     """Tells hair from other curves; the notes name what is left out.
 
     Args:
-        rigs: skeletons that may carry hair; not empty where `attachment` is asked.
+        rigs: skeletons that may carry hair; not empty if `attachment` is called.
         head: the user's `--head`.
         notes: what a user should know is added here.
         named: the user named these curves: none is left out because it is empty or far away.
         others: skeletons whose hair is not wanted; None where there are none.
-        forced: the user named the skeleton for these curves: that they are bound to another does not count.
+        forced: the user named the skeleton for these curves: a binding to another does not count.
 
     Attributes:
         rigs: as given.
@@ -63,21 +63,21 @@ class HairSearch:
         self.carriers: list[StageRig] = []
 
     def no_hair(self) -> list[str]:
-        """Why curves are not taken for hair: notes where other hair was found, the first of them the error where none was."""
+        """Why curves are not taken for hair: notes if other hair was found; if none was, the first one is the error."""
         others = [] if self._named else other_hair(self.rigs)
         return few(others) + few(self._unusable) + few(self._far) + controls_left_out(self._controls)
 
     def off_heads(self) -> list[str]:
-        """The notes on hair that is not on a head, where none on that hair names its joint."""
+        """The notes on hair that is not on a head, unless another note on it names its joint."""
         return few(self._off_head, "grooms ride on other joints than the head")
 
     def of_others(self) -> list[str]:
-        """The notes on hair of other skeletons than the named one."""
+        """The notes on hair of skeletons other than the named one."""
         return few(self._of_others, "grooms are not its hair")
 
     def nobodys(self) -> list[str]:
-        """Why hair that no other skeleton carries is not taken for the named one's, the nearest first: where that has no hair, its
-        own may lie elsewhere, or be bound to what cannot be used. The others are read for it.
+        """Why hair that no other skeleton carries is not taken for the named one's, the nearest first: if the named one has no
+        hair, its own may be elsewhere, or bound to something unusable. This reads the other skeletons.
         """
         if not (self._far_off or self._bound_off):
             return []
@@ -91,7 +91,7 @@ class HairSearch:
         ]
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
-        """The curves that have points, with a note on the others, and are not closed."""
+        """The curves that have points and are not closed, with a note on the others."""
         if not self._named:
             self._controls += [str(prim.GetPath()) for prim in curves if is_closed(prim)]
             curves = [prim for prim in curves if not is_closed(prim)]
@@ -100,10 +100,10 @@ class HairSearch:
         return [prim for prim in curves if prim not in empty]
 
     def attachment(self, prim: Usd.Prim, placement: Placement) -> Attachment | None:
-        """What carries the curves of a prim; None where they are another skeleton's, or no hair.
+        """What carries the curves of a prim; None if they are another skeleton's, or not hair.
 
         Raises:
-            NeuralocksError: as `attach`; or the curves are named, and those of a skeleton that cannot be used.
+            NeuralocksError: as `attach`; or the user named the curves, and their skeleton cannot be used.
         """
         told = len(self._notes)
         try:
@@ -121,12 +121,12 @@ class HairSearch:
             self._of_others.append(why)
             return None
         if bound and not self._forced and all(rig.path != bound for rig in self.rigs):
-            # On another's head it would be skinned by its own skeleton once more.
+            # On another's head it would also be skinned by its own skeleton.
             return self._without(path, bound, bound=True)
         if not (bound or self._forced) and (own := self._unusable_below(prim, placement)):
             return self._without(path, own.path, bound=False)
         if not bound:
-            _ = placement.reference  # before others are read: what lies nowhere is nobody's
+            _ = placement.reference  # before others are read: hair that cannot be placed is nobody's
             others = self._others.rigs if self._others else []
             if others and (other := of_another(prim, self.rigs, others, placement, self._head)):
                 self._of_others.append(another_carries(path, other))
@@ -142,10 +142,10 @@ class HairSearch:
         self._notes += [too_far(prim, found, named=True)] if found.far else []
         carrying = replace(found.rig, character=found.character)
         away, joint = off_head(found), leaf(rig_joint(found))
-        # A note on the joint itself; a blend shape may have its name.
+        # Only a note on the joint itself counts; a blend shape may have its name.
         if away and not any(found.how in note or f"joint '{joint}'" in note for note in self._notes[told:]):
             self._off_head.append(f"{path}: rides on '{joint}', not on a head")
-        measured = [] if away else untrained(carrying)  # a chest has not a head's measures
+        measured = [] if away else untrained(carrying)  # a chest does not have a head's measures
         self._notes += moved_as_open(prim) + undrawn(prim) + left_as_they_are(prim) + measured
         self._notes += unevenly_scaled(carrying) + coarsely_placed(prim, found.rig, found.character, placement)
         if found.rig not in self.carriers:
@@ -153,7 +153,7 @@ class HairSearch:
         return found
 
     def _clearly_of_another(self, prim: Usd.Prim, bound: str | None, placement: Placement) -> str:
-        """Why curves are not the named skeleton's, where that is clear without a look at the others; '' if it is not."""
+        """Why curves are not the named skeleton's, if that is clear without reading the others; '' if it is not."""
         if bound:
             if any(rig.path == bound for rig in self.rigs):
                 return ""
@@ -161,7 +161,7 @@ class HairSearch:
             return another_binds(str(prim.GetPath()), bound)
         try:
             found = attach(prim, self.rigs, placement, self._head, [])
-        except NeuralocksError:  # told below, unless it is another's
+        except NeuralocksError:  # reported below, unless it is another's
             return ""
         if not found.far:
             return ""
@@ -180,7 +180,7 @@ class HairSearch:
         self._unusable.append(why)
 
     def _unusable_below(self, prim: Usd.Prim, placement: Placement) -> Unusable | None:
-        """The skeleton that cannot be used on whose character the curves lie."""
+        """The unusable skeleton on whose character the curves lie."""
         if not self._unread:
             return None
         rigs = self._every

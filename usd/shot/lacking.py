@@ -41,7 +41,7 @@ def no_skeleton(stage: Usd.Stage, path: Path) -> NeuralocksError:
 
 
 def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
-    """The error for a stage that lacks what a bake needs; where layers are missing, it names those as the likely cause."""
+    """The error for a stage that lacks what a bake needs; if layers are missing, it names them as the likely cause."""
     missing = composition_notes(stage, path)
     if missing:
         loaded = missing[0].removeprefix(f"{path.name}: ").removesuffix("; skipping.")
@@ -52,11 +52,11 @@ def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> Neura
 def has_hair_joints(prim: Usd.Prim) -> bool:
     """Whether joints of a Skeleton are named like hair."""
     joints = UsdSkel.Skeleton(prim).GetJointsAttr()
-    with suppress(NeuralocksError):  # what is wrong with them is told where the skeleton is read
+    with suppress(NeuralocksError):  # errors in them are reported when the skeleton is read
         names = as_names(joints, joints.Get())
         if any(map(says_hair_alone, names)):
             return True
-        # A tail is hair below a head alone.
+        # A tail is hair only below a head.
         doubtful = [name for name in names if says_hair(name)]
         head = named_head(names) if doubtful else None
         return head is not None and any(name.startswith(f"{head}/") for name in doubtful)

@@ -25,7 +25,7 @@ def made_from(found: Attachment, groom: Groom) -> dict[str, str]:
 
 
 def unlike(one: dict, other: dict) -> list[str]:
-    """Which inputs differ in two records, of those that both tell."""
+    """Which inputs differ between two records, of those that both have."""
     mine, theirs = (made if isinstance(made := facts.get(INPUTS), dict) else {} for facts in (one, other))
     return [
         name for name in NEAR if name in mine and name in theirs and not _same(mine[name], theirs[name], NEAR[name])
@@ -33,10 +33,10 @@ def unlike(one: dict, other: dict) -> list[str]:
 
 
 def baked_from_others(prim: Usd.Prim, found: Attachment, groom: Groom) -> list[str]:
-    """The notes on a bake over a groom or an animation that is not the one that it was made from.
+    """The notes on a bake over another groom or animation than the one it was made from.
 
-    Where time codes are shifted or stretched between the bake and the stage, or units differ, or another joint is taken for
-    the head, nothing can be told.
+    If time codes are shifted or stretched between the bake and the stage, units differ, or another joint is taken as the head, they
+    cannot be compared.
     """
     told, border = recorded(prim), found.rig.border
     if INPUTS not in told or not seen_as_written(prim, border) or recorded_joint(prim) != rig_joint(found):
@@ -51,5 +51,5 @@ def _same(one: str, other: str, near: float) -> bool:
     first, second = (str(text).rpartition("strands ") for text in (one, other))
     try:
         return first[0] == second[0] and alike(first[2], second[2], near)
-    except ValueError:  # written by others
+    except ValueError:  # written by another program
         return True

@@ -13,7 +13,7 @@ def motion_notes(motion: Motion, joints: np.ndarray, humanoid: Humanoid) -> list
 
     Args:
         motion: from the file.
-        joints: the motion's world transforms (T, J, 4, 4), Y up, on whomever it moves.
+        joints: the motion's world transforms (T, J, 4, 4), Y up, on the character that it moves.
         humanoid: which of these joints are which.
     """
     notes = []

@@ -24,7 +24,7 @@ from .alike import one_person
 
 UNIT = UsdGeom.Tokens.metersPerUnit
 FEW = 3
-"""Similar lines told one by one."""
+"""Up to this many similar lines are told one by one."""
 
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
@@ -33,13 +33,13 @@ def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
 
 
 def _composition_errors(stage: Usd.Stage) -> list:
-    """Nothing where USD does not tell them: that of Blender 4.2, 24.05."""
+    """Empty if USD does not report them, as in Blender 4.2 (USD 24.05)."""
     return stage.GetCompositionErrors() if hasattr(stage, "GetCompositionErrors") else []
 
 
 def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
-    """Where a sublayer has another unit or axis than the shot's first layer, the only one of which USD reads them; and where
-    no layer says the unit that counts, or how long a frame is.
+    """Notes if a sublayer has another unit or axis than the shot's first layer, the only one from which USD reads them; and if no
+    layer states the unit in effect, or how long a frame is.
     """
     border, layers = Border.of(stage), stage.GetLayerStack(includeSessionLayers=False)
     notes = border.frame_notes(path.name)
@@ -68,13 +68,13 @@ def asked_notes(stage: Usd.Stage, rigs: Iterable[StageRig], codes: list[float], 
 
 
 def _edited(stage: Usd.Stage) -> list[str]:
-    """The notes on layers of a shot whose changes are in no file, so that another program reads another shot."""
+    """The notes on layers of a shot with unsaved changes, so that another program reads a different shot."""
     names = sorted(layer.GetDisplayName() for layer in unsaved(stage) if layer.realPath)
     return [f"{name}: has unsaved changes, which this bake has in it; save it" for name in names]
 
 
 def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
-    """The note on a layer over a shot that does not find, where it lies, all that the shot finds where that lies."""
+    """The note on a layer over a shot that cannot find, from its own folder, all files that the shot finds from its folder."""
     if os.path.realpath(out.parent) == os.path.dirname(os.path.realpath(stage.GetRootLayer().realPath)):
         return []
     found = {text_of(error) for error in _composition_errors(stage)}
@@ -88,7 +88,7 @@ def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
 
 
 def left_out(error) -> str:
-    """The note on a skeleton that cannot be used, beside others that can."""
+    """The note on a skeleton that cannot be used, if others can."""
     return f"{error} (this skeleton is left out)"
 
 
@@ -108,7 +108,7 @@ def few(lines: list[str], others: str = "prims are left out like that") -> list[
 
 
 def not_animated(rig: StageRig) -> str:
-    """Why a skeleton cannot be baked; if UsdSkel ignores its animation, also what is wrong with that one."""
+    """Why a skeleton cannot be baked; if UsdSkel ignores its animation, also what is wrong with the animation."""
     ignored = rig.source.ignored
     why = f" ({ignored.split(': ', 1)[1].split(';')[0]})" if ignored else ""
     return f"{rig.path}: the skeleton has no animation{why}; bind a SkelAnimation to it (skel:animationSource)"
@@ -169,7 +169,7 @@ def _without_elbow(rig: StageRig, joints) -> list[str]:
 
 
 def unlikely_head(rig: StageRig) -> list[str]:
-    """The note on a head of a size that no human's has."""
+    """The note on a head whose size no human head has."""
     width = rig.character.head_width
     if width is None or HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
         return []
@@ -193,7 +193,7 @@ def another_head(rig: StageRig) -> list[str]:
 
 
 def without_turn(rig: StageRig, pose_joints=POSE_JOINTS) -> list[str]:
-    """What stops a bake: joints that the network reads and that have no rotation, hidden by a scale of zero or mirrored."""
+    """What stops a bake: joints that the network reads but that have no rotation, hidden by a scale of zero or mirrored."""
     found: list[str] = []
     if "head" not in rig.character.humanoid:
         return found
@@ -210,7 +210,7 @@ def without_turn(rig: StageRig, pose_joints=POSE_JOINTS) -> list[str]:
         ):
             if bad.any():
                 code = rig.time_codes[bad.argmax()]
-                # Joints without a turn below a prim without one are that prim's.
+                # If a prim above has no rotation either, joints lack theirs because of it.
                 placed = rig.source.placement
                 whose = (
                     placed.whose(_turnless, code)
@@ -241,7 +241,7 @@ def partial_body(rig: StageRig, rigs: Iterable[StageRig]) -> list[str]:
 
 
 def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
-    """The note on a range of time codes in most of which the animation does not lie, so that the character stands still."""
+    """The note on a range of time codes that the animation mostly does not cover, so that the character stands still."""
     samples = rig.source.samples
     if len(samples) < 2:
         return []

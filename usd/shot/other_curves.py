@@ -17,9 +17,9 @@ from .attach import REACH
 from .seat import NEAR, ways
 
 MOST = 200
-"""Prims that are looked at: a rig may have thousands of such curves, to pull at."""
+"""Most prims that are looked at: a rig may have thousands of such curves as controls."""
 SOME_ROOTS = 50
-"""How many of a prim's curves are looked at, about."""
+"""About how many of a prim's curves are looked at."""
 
 
 def other_hair(rigs: Sequence[StageRig]) -> list[str]:
@@ -39,7 +39,7 @@ def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:
     roots = _roots(prim)
     try:
         return bool(len(roots)) and _lies_like_hair(roots, Placement(prim), rigs)
-    except Unplaced:  # as what a scale of zero hides, at first or for a while
+    except Unplaced:  # for example hidden by a scale of zero, at first or for a while
         return False
 
 
@@ -60,7 +60,7 @@ def _lies_like_hair(roots: np.ndarray, placement: Placement, rigs: Sequence[Stag
 
 
 def _roots(prim: Usd.Prim) -> np.ndarray:
-    """First points (n, 3) of some curves, without those that come back to it, as a rig's controls do; none where points are odd."""
+    """First points (n, 3) of some curves, without closed ones, as a rig's controls are; none if points are odd."""
     curves = UsdGeom.Curves(prim)
     attributes = curves.GetPointsAttr(), curves.GetCurveVertexCountsAttr()
     try:

@@ -38,7 +38,7 @@ class Others:
     @cached_property
     def rigs(self) -> list[StageRig]:
         """All of them that can be used."""
-        # All at once: where no other skeleton has a head, one without may be the head's.
+        # All at once: whether one without a named head is used depends on whether the others have one.
         return [rig for rig in self._read(self._prims) if rig.path not in self._paths]
 
     def maybe_same(self) -> list[StageRig]:

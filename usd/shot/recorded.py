@@ -20,7 +20,7 @@ def record(over: Sdf.PrimSpec, facts: dict) -> None:
 
 
 def recorded(prim: Usd.Prim) -> dict:
-    """What `record` wrote, with time codes as a list of those of the stage; empty where nothing did."""
+    """What `record` wrote, with time codes as a list in the stage's time; empty if there is no record."""
     facts, offset, _ = _strongest(prim)
     if not isinstance(facts, dict):
         return {}
@@ -46,29 +46,27 @@ def retimed(prim: Usd.Prim) -> list[str]:
 
 
 def seen_as_written(prim: Usd.Prim, border: Border) -> bool:
-    """Whether a groom's bake lies at its own time codes in the stage, and counts in the stage's unit and axis."""
+    """Whether the stage plays a groom's bake at its own time codes, and in its own unit and axis."""
     _, offset, layer = _strongest(prim)
     return offset.IsIdentity() and (layer is None or not border.differing(layer))
 
 
 def _strongest(prim: Usd.Prim) -> tuple:
-    """What the strongest layer tells, its offset, and the layer: composed, a bake over another one would tell a mixture of
-    both.
-    """
+    """What the strongest layer records, its offset, and the layer: composed, a bake over another one would give a mixture of both."""
     stack = prim.GetPrimStackWithLayerOffsets()
     told = ((spec.customData[KEY], offset, spec.layer) for spec, offset in stack if KEY in spec.customData)
     return next(told, (None, Sdf.LayerOffset(), None))
 
 
 def given_facts(cuts: list[float] | None, joints: dict[str, str] | None) -> dict:
-    """The record of the cuts, by time code, and of the joints that the user gave; empty where they were found."""
-    # Not as USD's type for time codes, for which it upgrades its files with a warning.
+    """The record of the cuts, by time code, and of the joints that the user gave; empty if they were detected."""
+    # Not as USD's type for time codes: for that, USD upgrades its files with a warning.
     told = {} if cuts is None else {"cuts": Vt.DoubleArray(cuts)}
     return told | ({"joints": dict(joints)} if joints else {})
 
 
 def recorded_cuts(prim: Usd.Prim) -> list[float] | None:
-    """The cuts recorded with a groom's bake; None where they were found, and will be again."""
+    """The cuts recorded with a groom's bake; None if they were detected, and will be again."""
     told = recorded(prim).get("cuts")
     return told if isinstance(told, list) else None
 
@@ -89,7 +87,7 @@ def recorded_material(prim: Usd.Prim) -> Material | None:
     """The material of a bake, None where it is not recorded.
 
     Raises:
-        NeuralocksError: what is recorded is no material.
+        NeuralocksError: what is recorded is not a material.
     """
     values = recorded(prim).get("material")
     if values is None:

@@ -13,13 +13,13 @@ from .seat import NEAR, find_seat
 
 
 def is_closed(prim: Usd.Prim) -> bool:
-    """Whether curves go round, as no hair does."""
+    """Whether curves are closed, as no hair is."""
     return UsdGeom.BasisCurves(prim).GetWrapAttr().Get() == UsdGeom.Tokens.periodic
 
 
 def is_lone_guide(prim: Usd.Prim, rigs: Sequence[StageRig], placement: Placement) -> bool:
-    """Whether a prim is one curve of purpose guide that nothing binds and that begins on no skin. What begins on skin may be
-    one of a groom's guides, of which some tools make a prim each.
+    """Whether a prim is one unbound curve of purpose guide that does not begin on skin. One that does may be a groom's guide: some
+    tools make a prim for each.
     """
     if UsdGeom.Imageable(prim).ComputePurpose() != UsdGeom.Tokens.guide or len(rest_counts(prim)) != 1:
         return False

@@ -26,19 +26,19 @@ from .curves import moment, rest_points
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
 CLEARLY = 2
-"""So many times nearer must hair be by another way than by a likelier one for the other to be believed: what hovers over
-skin may come a little nearer to it by a wrong one, as by one that counts a parent's scale twice.
+"""Hair must be this many times nearer to skin by a less likely way than by a likelier one for the former to count: hair that hovers
+over skin may come a little nearer by a wrong way, such as one that counts a parent's scale twice.
 """
 SOME_ROOTS, SOME_TIMES = 1000, 16
-"""How many of a groom's roots and of a prim's samples are looked at, about: all are too many."""
+"""About how many of a groom's roots and of a prim's samples are looked at: all would be too many."""
 
 STEADY = 1e-4
-"""A prim that drifts no more than this against something is moved by it."""
+"""A prim that drifts no more than this relative to something is moved by it."""
 ABOUT, ROUNDED = 10.0, 0.01
-"""Drifts are shares of how far from the origin a prim stands, but of no more than so many metres, or, as places there are
-rounded, than such a part of it."""
+"""A drift is a share of the prim's distance from the origin, but of at most ABOUT metres or, since far positions are rounded, of
+ROUNDED times that distance."""
 APART = 5e-3
-"""Places of a groom that are so far from each other [m] are not the same to the eye."""
+"""Places of a groom this far from each other [m] look different."""
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ class Seat:
 def find_seat(
     prim: Usd.Prim, rig: StageRig, placement: Placement, within: float = np.inf, *, last: bool = False
 ) -> Seat | None:
-    """A groom on a rig's nearest skin, by its strands' first or last points; None where the rig has no skin, or none `within`
-    so far [m].
+    """A groom on a rig's nearest skin, by its strands' first or last points; None if the rig has no skin, or none `within` this
+    distance [m].
     """
     seats = [_find_seat(roots, moment(prim), rig, placement, within) for roots in either_ends(prim, last=last)]
     return min((seat for seat in seats if seat is not None), key=lambda seat: seat.distance, default=None)
@@ -105,8 +105,8 @@ def _find_seat(
 
     def nearest(best: Seat | None, mesh, skin, way: tuple[bool, int], to_bind) -> Seat | None:
         placed = transformed(roots, to_bind)
-        # In a crowd nearly all skins are far, and to find the nearest point of a far one takes a hundred times as long
-        # as to find that none is near. Twice the bound, for what is nearer by another way must be so CLEARLY.
+        # In a crowd nearly all skins are far, and finding the nearest point of a far one takes a hundred times as long as finding
+        # that none is near. Twice the bound, because what is nearer by another way must be CLEARLY nearer.
         middle = float(np.median(skin.query(placed, CLEARLY * within)[0]))
         clear = CLEARLY if best is not None and way > best.way else 1
         better = np.isfinite(middle) and (best is None or clear * middle < best.distance - 1e-4)
@@ -138,7 +138,7 @@ def ways(
         placement: where the groom's prim stands.
         when: time code at which the groom has the points it is read with, if they are no points at rest.
         likely: those that serve unless skin says otherwise, or the others.
-        drifts: as `_drifts` has them, where that was asked before.
+        drifts: the result of `_drifts`, if it is known already.
     """
     groom = placement.reference
     still = []
@@ -153,11 +153,11 @@ def ways(
     if with_skeleton <= STEADY:
         # Or it was made where the character stands when its motion begins, or the shot.
         return still if likely else [_posed(rig, placement, code) for code in beginnings(rig)]
-    # A prim that is moved along by its parents: where it stood against the head when that motion began.
+    # A prim that is moved along by its parents: where it stood relative to the head when that motion began.
     posed = [_posed(rig, placement, placement.samples[0])]
     if with_head <= STEADY:
         return posed if likely else still
-    # A set moves along what stands and walks in it; only what nearly keeps to the head was made on that.
+    # A set carries along what stands and walks in it; only what nearly keeps to the head was made on it.
     both = posed + still if CLEARLY * with_head < with_skeleton else still + posed
     return both if likely else []
 
@@ -211,8 +211,8 @@ def _posed(rig: StageRig, placement: Placement, when: float) -> np.ndarray:
 
 
 def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
-    """How much a prim moves against a skeleton, and against its head; (0, 0) where either stands still, infinity for the head
-    where the skeleton's place moves the prim.
+    """How much a prim moves relative to a skeleton, and to its head; (0, 0) if either stands still, infinity for the head if the
+    skeleton's place moves the prim.
     """
     if not placement.samples or not rig.source.animated:
         return 0.0, 0.0
@@ -226,8 +226,8 @@ def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
 
 
 def some_places(rig: StageRig, placement: Placement) -> tuple[np.ndarray, np.ndarray]:
-    """Some samples of a rig's clip (n,), and where a prim stands at each (n, 4, 4) [m]; without those at which it cannot be
-    placed, as it is flat then, say, which is told where a bake comes to them.
+    """Some samples of a rig's clip (n,), and where a prim stands at each (n, 4, 4) [m]; without those at which it cannot be placed,
+    for example because it is flat: a bake reports them when it gets there.
     """
     rows, places = [], []
     for row in np.unique(np.linspace(0, len(rig.time_codes) - 1, SOME_TIMES).astype(int)):
@@ -238,7 +238,7 @@ def some_places(rig: StageRig, placement: Placement) -> tuple[np.ndarray, np.nda
 
 
 def _drift(placement: Placement, against: Callable[[float], np.ndarray], about: float) -> float:
-    """How much a moving prim moves against something else in stage space, as a share: 0 if that is what moves it; `about` is
+    """How much a moving prim moves relative to something else in stage space, as a share: 0 if that is what moves it; `about` is
     ABOUT in units of the stage.
     """
     times = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)]

@@ -18,7 +18,7 @@ TOUCHES = 0.003
 ASTRAY = 0.3
 """Bound hair farther from skin than this [m], on a person, is not where its author has put it: hats and wigs are nearer."""
 COARSE = 2e-4
-"""Points that single precision can only put so far apart [m] make strands tremble, which are about half as thick."""
+"""If single precision can only put points this far apart [m], strands, which are about half as thick, tremble."""
 LEVEL = 0.001
 """Points nearer to skin than this [m] are all alike: skins are only as smooth as their triangles."""
 
@@ -54,7 +54,7 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
         return []
     first, last = (off_skin(some_ends(prim, last=last), rig, to_bind) for last in (False, True))
     if first <= NEAR:
-        # Most hair's last points are much farther from the skin's own, and it is not measured more exactly.
+        # Most hair's last points are much farther from the skin's points; then nothing is measured more exactly.
         first = _turned_round(prim, rig, to_bind) if last <= CLEARLY * first else 0.0
     if last > NEAR or not first:
         return []
@@ -67,8 +67,8 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
 def _turned_round(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> float:
     """How far above skin the first points of hair near to it lie [m]; 0 unless its last ones are clearly its roots.
 
-    Short hair is near to skin all along, and the tips of long hair lie on shoulders. These do not follow the head, so where
-    only one end of the strands does, that is rather their root.
+    Short hair is near to skin all along, and the tips of long hair lie on shoulders. Shoulders do not follow the head, so if only
+    one end of the strands does, it is more likely the root.
     """
     body, head = rig.character.body, rig.character.humanoid.get("head")
     if rig.surface is None:  # no more can be said than how far its points are
@@ -92,7 +92,7 @@ def _turned_round(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> float:
 
 
 def not_pinned(prim: Usd.Prim, rig: StageRig, drawn: bool, beyond: Beyond | None) -> list[str]:
-    """The note on curves that begin on skin but are drawn from above it, for they lack the points beyond their ends."""
+    """The note on curves that begin on skin but are drawn from above it, because they lack the points beyond their ends."""
     if drawn or beyond is None or not len(beyond.before) or not rig.skins:
         return []
     return [

@@ -30,7 +30,7 @@ def read_each_rig(
     Args:
         stage, border, head, options: as for `read_rig`.
         prims: the Skeletons.
-        cuts: those of all, or a dictionary of them by path.
+        cuts: those of all skeletons, or a dictionary of them by path.
     """
     rigs, errors, unnamed, skins = [], [], [], find_skins(stage)
     for prim in prims:
@@ -56,7 +56,7 @@ def read_each_rig(
 
 
 def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
-    """The joint that carries the groom of most points, and how that is known; None where nothing says so."""
+    """The joint that carries the groom of most points, and how that is known; None if nothing says so."""
     curves = find_curves(rig.source.prim.GetStage())
     empty = without_points(curves)
     for prim in sorted((p for p in curves if p not in empty), key=lambda prim: -len(rest_points(prim))):

@@ -78,8 +78,8 @@ class Shot:
         path: the file.
         stage: kept open: poses are sampled from it at the exact time codes of a bake.
         border: its units.
-        rigs: skeletons, those that carry a groom at least.
-        grooms: what is to be deformed.
+        rigs: skeletons, at least those that carry a groom.
+        grooms: those to deform.
         first, last: frame range in time codes.
         notes: what a user should know, one line each.
     """
@@ -102,10 +102,10 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         path: a USD file.
         grooms: prim paths of the grooms wanted; if left out, all curves that lie on a skin or near a head.
         skeleton: prim path of the skeleton that carries them; found if left out.
-        head: joint (path, or its last part) that carries grooms for which no binding says so.
-        joints: semantic joint -> joint (path, or its last part), where names do not tell.
-        cuts: time codes from which every character is elsewhere and its hair starts anew, or these by skeleton path; found
-            where None.
+        head: joint (path, or its last part) that carries the grooms that no binding assigns to a joint.
+        joints: semantic joint -> joint (path, or its last part), if names are not enough.
+        cuts: time codes at which every character is suddenly elsewhere and its hair starts anew, or a dictionary of them by
+            skeleton path; detected if None.
 
     Raises:
         NeuralocksError: what stops a bake, with the prim and the remedy.
@@ -164,13 +164,13 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
 def read_rigs(
     path, skeleton: str | None = None, head: str | None = None, joints: dict[str, str] | None = None
 ) -> tuple[StageRig, ...]:
-    """The characters and motion of a file, without grooms and whether animated or not.
+    """The characters and motion of a file, animated or not, without grooms.
 
     Args:
         path: a USD file.
         skeleton: prim path of the one wanted; all if left out.
-        head: joint that is the head, where its name does not tell.
-        joints: semantic joint -> joint, where names do not tell.
+        head: joint that is the head, if its name does not tell.
+        joints: semantic joint -> joint, if names are not enough.
     """
     stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
     rigs, unusable = _rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=True, joints=joints)
@@ -179,7 +179,7 @@ def read_rigs(
 
 
 def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
-    """First and last time code: the stage's own, else the animation's."""
+    """First and last time code: the stage's own, otherwise the animation's."""
     if stage.HasAuthoredTimeCodeRange():
         first, last = float(stage.GetStartTimeCode()), float(stage.GetEndTimeCode())
         if np.isfinite([first, last]).all() and first <= last:
@@ -214,7 +214,7 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
 
 
 def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
-    """The grooms whose skeleton is animated, with a note on the others; all where none is."""
+    """The grooms whose skeleton is animated, with a note on the others; all if none is."""
     moving = [item for item in grooms if item.attachment.rig.source.animated]
     if not moving:
         return grooms

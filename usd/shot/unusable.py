@@ -26,11 +26,11 @@ from .seat import NEAR, either_ends, kinship, off_skin
 
 @dataclass(frozen=True)
 class Unusable:
-    """A skeleton that cannot be read, as far as it can be.
+    """What could be read of a skeleton that cannot be used.
 
     Attributes:
         prim: the Skeleton.
-        headless: whether no joint is named like a head: it may be a hat's, or a face's, on a head that another one moves.
+        headless: whether no joint is named like a head: it may be a hat's, or a face's, on a head that another skeleton moves.
         skins: per mesh, its points at rest in the stage, in its place, where its skeleton stands, and as bound [m].
     """
 
@@ -40,12 +40,12 @@ class Unusable:
 
     @property
     def path(self) -> str:
-        """Of the prim."""
+        """The prim's path."""
         return str(self.prim.GetPath())
 
 
 def find_unusable(stage: Usd.Stage, usable: set[str]) -> list[Unusable]:
-    """The skeletons of a stage that are none of the usable ones, given by their paths."""
+    """The skeletons of a stage other than the `usable` ones, which are given by path."""
     prims = [prim for prim in find_skeletons(stage) if str(prim.GetPath()) not in usable]
     skins, border = find_skins(stage) if prims else {}, Border.of(stage)
     return [Unusable(prim, _headless(prim), _skins(prim, skins, border)) for prim in prims]
@@ -58,13 +58,13 @@ def lies_on(
     unusable: list[Unusable],
     placement: Placement,
 ) -> Unusable | None:
-    """On the character of which skeleton that cannot be used curves without a binding lie, rather than on one that can.
+    """The unusable skeleton on whose character curves without a binding lie, if they do not lie on a usable one's.
 
-    Skin tells; where there is none, or as much of it, among whose prims the curves are.
+    Skin decides; without skin, or with both equally near, the prims that the curves are among.
 
     Args:
         prim: the curves.
-        found: what else would carry them; None where nothing does, or several as likely.
+        found: what else would carry them; None if nothing does, or several are equally likely.
         rigs: the skeletons that can be used.
         unusable: those that cannot.
         placement: where the curves stand.
@@ -104,7 +104,7 @@ def _off(roots: np.ndarray, skins: list[cKDTree]) -> float:
 def _headless(prim: Usd.Prim) -> bool:
     joints = UsdSkel.Skeleton(prim).GetJointsAttr()
     try:
-        # Where they are is not asked: that may be just what is wrong.
+        # Where the joints are is not read: that may be just what is wrong.
         return named_head(as_names(joints, joints.Get())) is None
     except NeuralocksError:  # of another type than names
         return True

@@ -13,7 +13,7 @@ from ..border.units import Border
 from .joints import JointSource
 
 LEAST = 1e-6
-"""Less than this times its size in the bind pose is no size."""
+"""Less than this times the size in the bind pose counts as no size."""
 
 
 def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humanoid: Humanoid) -> np.ndarray:

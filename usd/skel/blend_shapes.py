@@ -65,7 +65,7 @@ def knot_weights(meshes: list[dict[str, Knots]]) -> dict[str, list[float]]:
 def shares(weights: np.ndarray, knots: list[float]) -> np.ndarray:
     """How much of the offsets at each knot, (T, len(knots)), make the shape at weights (T,).
 
-    Linear between neighbouring knots, of which rest is one; outside, the outermost line goes on, as UsdSkel has it.
+    Linear between neighbouring knots, of which rest is one; outside, the outermost line continues, as in UsdSkel.
     """
     points = np.array(sorted({0.0, *knots}))
     low = np.clip(np.searchsorted(points, weights, side="right") - 1, 0, len(points) - 2)
@@ -82,7 +82,7 @@ def at_knot(shape: Knots, knot: float) -> np.ndarray:
 
 
 def _dense(offsets: np.ndarray, chosen: np.ndarray, count: int, path) -> np.ndarray:
-    """Offsets of all points (count, 3), out of those of the chosen ones if any are."""
+    """Offsets of all points (count, 3), from those of the chosen points, if any are chosen."""
     if not np.isfinite(offsets).all():
         raise NeuralocksError(f"{path}: blend shape offsets hold NaN or infinity; repair it")
     if not len(chosen):

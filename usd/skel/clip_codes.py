@@ -10,23 +10,23 @@ from ..border.units import Border
 from .joints import JointSource
 
 CLOSE = 1.5 / 24
-"""Samples at most this far apart [s] are one for every frame, at whatever rate the stage runs."""
+"""Samples at most this far apart [s] count as one for every frame, at whatever rate the stage runs."""
 SAME = 1e-4
-"""Samples nearer to each other, in frames, are one: layer offsets and other programs' clocks part what was keyed together,
-and over so little time a rounding error of a pose is a blow."""
+"""Samples nearer to each other than this, in frames, are one: layer offsets and other programs' clocks separate what was keyed
+together, and over so little time a rounding error of a pose is a blow."""
 STEP = 0.25
-"""Samples at most so far apart, in frames, may be the two sides of a step, as programs write keys that hold,"""
+"""Samples at most this far apart, in frames, may be the two sides of a step, which programs write for held keys."""
 ALONE = 4.0
-"""if the next ones are more than so many times as far away. A smooth curve through both sides would swing far out, before the
-step, too: of the two the one after it counts, and the step takes a frame, as if each frame had a sample."""
+"""They are if the next samples are more than this many times as far away. A smooth curve through both sides would overshoot far,
+also before the step: so only the later sample counts, and the step takes a frame, as if each frame had a sample."""
 STAND = 0.1
-"""A shot that begins at least so long [s] before its samples shows a character that stands meanwhile. An exporter's range is
-often a frame or two wider than its samples: standing before them, it would start with a blow."""
+"""If a shot begins at least this long [s] before its samples, the character stands until they begin. An exporter's range is often a
+frame or two wider than its samples: a character that stood before them would start with a blow."""
 
 
 def clip_codes(source: JointSource, border: Border) -> np.ndarray:
     """Ascending time codes (T,): the animation's samples, every frame in gaps wider than CLOSE, and the ends of a shot where
-    the character stands before or after its samples. Where these are too many to hold, one for every frame, with a note.
+    the character stands before or after its samples. If these are too many to hold, one for every frame, with a note.
 
     Raises:
         NeuralocksError: there are too many.
@@ -38,7 +38,7 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
     first, last = samples[0], samples[-1]
 
     def held(first: float, last: float, count: int) -> bool:
-        """Whether frames and so many samples can be; of times without end they cannot."""
+        """Whether frames and this many samples fit in memory; for infinite times they do not."""
         return ((last - first) / frame + count) * len(source.names) <= LARGEST_CLIP
 
     if held(first, last, 2) and not held(first, last, len(samples)):

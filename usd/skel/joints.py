@@ -20,7 +20,7 @@ from ..border.values import as_names, as_numbers
 from .rig_copy import source_of
 
 STRETCH = 0.003
-"""A quaternion's length may be off by so much before a user is told: single and half precision are nearer."""
+"""A quaternion's length may be off by this much without a note: single and half precision are nearer."""
 
 
 class JointSource:
@@ -33,14 +33,14 @@ class JointSource:
         bind: bind transforms as authored, (J, 4, 4).
         rest: local rest transforms, (J, 4, 4).
         animation: the SkelAnimation prim, or None.
-        copied: the SkelAnimation prim that `animation` is read instead of, as it is a rig bake's copy of that; or None.
+        copied: the SkelAnimation prim of a rig bake in place of which `animation`, its original, is read; or None.
         placement: where the skeleton stands.
         notes: what a user should know about it.
         ignored: the note that says why the animation does not count; None if it does, or if there is none.
 
     Args:
         prim: the Skeleton.
-        unbaked: read the animation that a rig bake copied in the place of its copy.
+        unbaked: read the animation that a rig bake copied instead of its copy.
 
     Raises:
         NeuralocksError: it has no joints, or arrays that do not fit each other.
@@ -71,8 +71,8 @@ class JointSource:
 
     @cached_property
     def samples(self) -> list[float]:
-        """Ascending time codes with an authored sample: the animation's and the moving parents'. Keys of what stays as it is are
-        no motion: where they begin before it, the character would stand there, and hair would start with a blow.
+        """Ascending time codes with an authored sample: the animation's and the moving parents'. Keys on what does not change are
+        not motion: if they begin before it, the character would stand there, and hair would start with a blow.
         """
         channels = [(self.placement.samples, self.placement.at)]
         if self._columns is not None:
@@ -93,7 +93,7 @@ class JointSource:
 
     @property
     def moves_joints(self) -> bool:
-        """Whether a SkelAnimation gives the pose; else UsdSkel shows the rest pose."""
+        """Whether a SkelAnimation gives the pose; otherwise UsdSkel shows the rest pose."""
         return self._columns is not None
 
     def posed(self, time_codes) -> np.ndarray:
@@ -138,7 +138,7 @@ class JointSource:
             if not Sdf.Path.IsValidPathString(name):
                 raise NeuralocksError(f"{self.path}: joint {index} is named '{name}', which is not a path; rename it")
             if name in seen:
-                # Exporters put '_' for each letter that they do not take: all names of a Japanese rig become alike.
+                # Exporters replace each letter that they do not take with '_': all names of a Japanese rig become alike.
                 lost = not any(letter.isalnum() for letter in leaf(name))
                 remedy = (
                     "export it with Unicode names allowed, or rename its bones" if lost else "make joint paths unique"
@@ -219,7 +219,7 @@ class JointSource:
         self.notes.append(why)
 
     def _unusable_channel(self) -> str | None:
-        """What is wrong with a channel for which UsdSkel ignores the animation, None if nothing is."""
+        """What is wrong with a channel that makes UsdSkel ignore the animation; None if nothing is."""
         path = self.animation.GetPath()
         for attribute, kind in zip(self._channels(), (Vt.Vec3fArray, Vt.QuatfArray, Vt.Vec3hArray)):
             name = attribute.GetName()
@@ -232,7 +232,7 @@ class JointSource:
         return None
 
     def local(self, time_codes) -> np.ndarray:
-        """Joints (T, J, 4, 4) against their parents at time codes (T,)."""
+        """Joints (T, J, 4, 4) relative to their parents at time codes (T,)."""
         result = np.broadcast_to(self.rest, (len(time_codes), *self.rest.shape)).copy()
         if self._columns is None:
             return result
@@ -269,7 +269,7 @@ class JointSource:
         )
 
     def _note_lengths(self, time_codes, turns, joints) -> None:
-        """A note on rotations that UsdSkel would stretch the character by, while they are read as plain ones here."""
+        """Note rotations that UsdSkel would stretch the character by, although they are read as plain ones here."""
         off = np.abs(np.linalg.norm(turns, axis=-1) - 1) > STRETCH
         if not off.any() or any("of unit length" in note for note in self.notes):
             return

@@ -14,9 +14,9 @@ AT_A_TIME = 64
 
 
 def motion_sketch(source: JointSource, rate: float) -> str:
-    """Bind pose, times of the samples [s], and in these local joints, blend shape weights and how the parents move it.
+    """Bind pose, times of the samples [s], and at those times local joints, blend shape weights and the parents' motion.
 
-    Of a rig bake, those of the animation that it was made from: it moves the hair and not the body.
+    For a rig bake, those of the animation that it was made from: the bake moves the hair and not the body.
     """
     if source.animation and source_of(source.animation):
         source = JointSource(source.prim, unbaked=True)

@@ -7,13 +7,13 @@ from pxr import Sdf, Usd, UsdSkel, Vt
 from ..border.values import as_names
 
 SOURCE = "neuralocks:animation"
-"""A relationship to the animation that was copied,"""
+"""A relationship to the animation that was copied."""
 HAIR = "neuralocks:joints"
-"""and the joints whose rotations are not that one's."""
+"""The joints whose rotations are not from that animation."""
 
 
 def tell_source(copy: Sdf.PrimSpec, source: Usd.Prim, hair: list[str]) -> None:
-    """Write on a copy what it was made from, and its hair joints; nothing where that was itself."""
+    """Write on a copy what it was made from, and its hair joints; nothing if it was made from itself."""
     if copy.path != source.GetPath():
         Sdf.RelationshipSpec(copy, SOURCE, custom=True).targetPathList.explicitItems = [source.GetPath()]
         spec = Sdf.AttributeSpec(copy, HAIR, Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
@@ -21,7 +21,7 @@ def tell_source(copy: Sdf.PrimSpec, source: Usd.Prim, hair: list[str]) -> None:
 
 
 def source_of(animation: Usd.Prim) -> Usd.Prim | None:
-    """The animation that one was copied from, where that is still there; None also where it is no copy."""
+    """The animation that one was copied from, if that is still there; None also if it is not a copy."""
     targets = animation.GetRelationship(SOURCE).GetTargets() if animation.HasRelationship(SOURCE) else []
     found = [animation.GetStage().GetPrimAtPath(path) for path in targets]
     whole = [
@@ -33,12 +33,12 @@ def source_of(animation: Usd.Prim) -> Usd.Prim | None:
 
 
 def hair_of(copy: Usd.Prim) -> tuple[str, ...]:
-    """The hair joints of a copy, where it tells them."""
+    """The hair joints of a copy, if it records them."""
     attribute = copy.GetAttribute(HAIR)
     return as_names(attribute, attribute.Get()) if attribute else ()
 
 
 def alike(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether local joint transforms (T, J, 4, 4) are the same but for rounding."""
+    """Whether local joint transforms (T, J, 4, 4) are the same except for rounding."""
     parts = ((part[..., :3, :3], part[..., :3, 3]) for part in (one, other))
     return all(np.allclose(a, b, rtol=0, atol=1e-4 * max(1e-6, np.abs(a).max())) for a, b in zip(*parts))

@@ -10,7 +10,7 @@ WIDE = 0.06
 """Triangles with a side longer than this [m] are split until none is: on smaller ones most hair is within half of it of a
 corner, near enough to be seen to sit there."""
 MOST = 100_000
-"""So many triangles, about, may come of that: one huge triangle must not fill the memory."""
+"""About this many triangles may result: one huge triangle must not fill the memory."""
 
 
 class Skin:
@@ -27,8 +27,8 @@ class Skin:
         self._tree = cKDTree(np.concatenate([points, more]))
 
     def query(self, points: np.ndarray, within: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
-        """Distance [m] of points (n, 3) from the skin, and the mesh's vertex that is there; infinity, and V, where it is not
-        `within` so far [m].
+        """Distance [m] of points (n, 3) from the skin, and the mesh's vertex there; infinity and V if it is not `within` this
+        distance [m].
         """
         distance, found = self._tree.query(points, distance_upper_bound=within)
         # The tree gives the number of its points where none is near.

@@ -23,7 +23,7 @@ from .stage_rig import StageRig, joint_trim
 from .surface import Skins, bound_meshes, find_skins, merged_body, not_posed
 
 COMPARED = 100
-"""About so many poses of a rig bake are compared with those that it was made from."""
+"""About this many poses of a rig bake are compared with those that it was made from."""
 
 
 def read_rig(
@@ -47,11 +47,11 @@ def read_rig(
         border: the stage's units.
         head: joint that is the head; found by name and hierarchy if left out.
         all_shapes: keep blend shapes that the animation does not use.
-        joints: semantic joint -> joint path or its last part, where names do not tell.
+        joints: semantic joint -> joint path or its last part, if names are not enough.
         cuts: time codes from which the character is elsewhere; found if None. Those outside the animation are ignored.
         skins: of the stage, if they were looked for already.
-        headless: read it without a head, and without any other joint's meaning, where no joint is named like one.
-        unbaked: of a rig bake, the animation that it was made from, with a note where the two differ.
+        headless: if no joint is named like a head, read it without one, and without any other semantic joint.
+        unbaked: for a rig bake, read the animation that it was made from, with a note if the two differ.
 
     Raises:
         NoHead: no joint is named like a head.
@@ -111,7 +111,7 @@ def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
 
 
 def _old_copy(source: JointSource, time_codes: np.ndarray) -> list[str]:
-    """The note on a rig bake whose body does not move as the animation does that it was made from."""
+    """The note on a rig bake whose body does not move like the animation that it was made from."""
     copy = source.copied or source.animation
     original = copy and source_of(copy)
     if not original:
@@ -123,7 +123,7 @@ def _old_copy(source: JointSource, time_codes: np.ndarray) -> list[str]:
         same = alike(*(each.local(codes)[:, body] for each in both))
         if same and np.allclose(*(each.shape(both[1].shape_names, codes) for each in both), atol=1e-4):
             return []
-    except NeuralocksError:  # whichever is read tells it
+    except NeuralocksError:  # reported when one is read
         return []
     fact = (
         f"{source.path}: its animation {copy.GetName()} is a rig bake of {original.GetPath()}, which has changed since"
@@ -139,7 +139,7 @@ def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:
 
 
 def _twice(source: JointSource, by_hand: dict[str, str], humanoid: Humanoid) -> list[str]:
-    """The notes on joints that the user gave a meaning while they have another one, too: one does not turn against itself."""
+    """The notes on joints that the user gave a meaning while they have another one, too: a joint does not turn relative to itself."""
     said = {}
     for name in by_hand:
         others = [other for other in humanoid if other != name and humanoid[other] == humanoid[name]]

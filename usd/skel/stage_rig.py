@@ -50,8 +50,8 @@ class StageRig:
     _carrying: dict[tuple[int, float], np.ndarray] = field(default_factory=dict, repr=False, compare=False)
 
     def carrying_at(self, time_code: float) -> np.ndarray:
-        """What the carrying joint does to bind world [m] at a time code, (4, 4), remembered: each groom of a crowd asks each
-        character for it at the same few; nothing where it has no head.
+        """The carrying joint's motion from bind world [m] at a time code, (4, 4), cached: each groom of a crowd asks each character
+        for it at the same few. The identity if it has no head.
         """
         if "head" not in self.character.humanoid:
             return np.eye(4)
@@ -65,8 +65,8 @@ class StageRig:
         return self._to_world @ self.source.posed([time_code])[0] @ self._trim
 
     def authored_turns(self, joints: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """Turns (..., N, 4) wxyz of joints (N,) in the bind axes that the file gives them, out of those in the core's: a turn
-        about axes that `joint_trim` mirrors along x is (w, x, -y, -z) in the file's.
+        """Turns (..., N, 4) wxyz of joints (N,) in the bind axes that the file gives them, from those in the core's: a turn about
+        axes that `joint_trim` mirrors along x is (w, x, -y, -z) in the file's.
         """
         result = np.array(turns)
         result[..., self._trim[joints, 0, 0] < 0, 2:] *= -1
@@ -82,13 +82,13 @@ class StageRig:
         """
         ends = self.clip.joints[[0, -1], :, :3, :3]
         turn = np.degrees(angle_between(*polar(ends)[0]))
-        turn[flat(ends).any(axis=0)] = 0  # what is scaled to nothing has no turn
+        turn[flat(ends).any(axis=0)] = 0  # what is scaled to zero has no turn
         for joint in replaced:  # and what hangs from it
             turn[self.character.skeleton.below(joint)] = 0
         start, end = self.time_codes[[0, -1]]
         notes = []
         if turn.max() > LOOP_GAP:
-            # What hangs from a joint turns with it, up to rounding: the first of them is the one that does.
+            # Joints below a joint turn with it, up to rounding: the first of them is the cause.
             name = self.source.names[int(np.flatnonzero(turn > turn.max() - 0.1)[0])]
             notes.append(
                 f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
@@ -103,12 +103,12 @@ class StageRig:
         return notes
 
     def cut_notes(self, loop: bool = False) -> list[str]:
-        """Where the hair starts anew, if it does anywhere, and where it does not, though the head leaps; of a loop, in which it
-        never does, where it ought to.
+        """Notes on where the hair starts anew, and where it does not although the head jumps; for a loop, in which it never does,
+        on where it should.
         """
         if "head" not in self.character.humanoid:
             return []
-        # A loop was read as if it had none.
+        # A loop was read as if it had no cuts.
         cuts = find_cuts(self.clip, self.character.head) if loop else self.clip.cuts
         flashes = [] if loop else find_flashes(self.clip, self.character.head)
         what = (
@@ -137,11 +137,11 @@ class StageRig:
 
     @cached_property
     def surface(self) -> Collider | None:
-        """The body in bind pose, for distances from its faces; None where it has no face."""
+        """The body in bind pose, for distances from its faces; None if it has no face."""
         body = self.character.body
         try:
             return None if body is None else Collider(body.points, body.triangles)
-        except NeuralocksError:  # a mesh of points alone
+        except NeuralocksError:  # a mesh without faces
             return None
 
     @cached_property

@@ -50,13 +50,13 @@ class StageMesh:
 
 
 FORMER = "neuralocks:skeleton"
-"""A relationship to the skeleton from which a bake unbound a prim: of flattened layers, all that is left to tell it."""
+"""A relationship to the skeleton from which a bake unbound a prim: in flattened layers, the only trace of it."""
 Skins = dict[str, list[Usd.Prim]]
 """Path of a skeleton -> the Mesh prims that it skins, in stage order."""
 
 
 def find_skins(stage: Usd.Stage) -> Skins:
-    """The skinned meshes of a stage: looked for once, a set may have many more meshes than its characters."""
+    """The skinned meshes of a stage, searched once: a set may have many more meshes than its characters."""
     found: Skins = {}
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
         if prim.IsA(UsdGeom.Mesh) and (skeleton := bound_skeleton(prim)) is not None:
@@ -75,7 +75,7 @@ def bound_meshes(skins: Skins, source: JointSource, notes: list[str]) -> list[St
 
 
 def not_posed(meshes: list[StageMesh], source: JointSource) -> list[str]:
-    """The note on meshes that USD draws as they were made, whatever their skeleton does, as no prim above them is a SkelRoot."""
+    """The note on meshes that USD draws as they were made, whatever their skeleton does, because no prim above them is a SkelRoot."""
     outside = [mesh.prim for mesh in meshes if not any(above.IsA(UsdSkel.Root) for above in _lineage(mesh.prim))]
     if not outside:
         return []
@@ -130,7 +130,7 @@ def bound_skeleton(prim: Usd.Prim) -> str | None:
 
 
 def influences(prim: Usd.Prim) -> tuple[UsdGeom.Primvar | None, UsdGeom.Primvar | None]:
-    """The primvars of joint indices and weights in effect on a prim; inherited ones too, as UsdSkel has it."""
+    """The primvars of joint indices and weights in effect on a prim; inherited ones too, as in UsdSkel."""
     api = UsdGeom.PrimvarsAPI(prim)
     pair = [api.FindPrimvarWithInheritance(f"skel:joint{part}") for part in ("Indices", "Weights")]
     return tuple(pair) if all(p and p.HasValue() for p in pair) else (None, None)
@@ -184,7 +184,7 @@ def geom_bind(prim: Usd.Prim) -> np.ndarray:
 
 
 def _in_effect(prim: Usd.Prim, name: str) -> Usd.Attribute | None:
-    """A binding property with a value: the prim's own, else that of the nearest prim above with a binding, as UsdSkel has it."""
+    """A binding property with a value: the prim's own, otherwise that of the nearest prim above with a binding, as in UsdSkel."""
     for above in _lineage(prim):
         attribute = above.GetAttribute(name)
         if attribute and (above == prim or above.HasAPI(UsdSkel.BindingAPI)):
