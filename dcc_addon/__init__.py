@@ -4,7 +4,7 @@
 import sys
 from pathlib import Path
 
-# Read by Blender before 4.2, which knows no manifest.
+# Read by Blender before 4.2, which does not know manifests.
 bl_info = {
     "name": "Neuralocks",
     "author": "The Neuralocks authors",

@@ -22,12 +22,12 @@ PAUSE = 0.3
 
 _work: list = []
 _wanted = {"at": 0.0, "closely": False}
-"""When to look, on the clock, and whether at how rigs are made up, too."""
+"""When to look, on the clock, and whether to look at how rigs are made up, too."""
 
 
 def request() -> None:
-    """Sample what is out of date, once nothing has been edited for a while, and from the start; without a window there is
-    nobody to wait, and operators sample when they need it.
+    """Sample what is out of date, from the start, once nothing has been edited for a while. Without a window nobody waits for it,
+    and operators sample when they need it.
     """
     _work.clear()
     if bpy.app.background:
@@ -38,7 +38,7 @@ def request() -> None:
 
 
 def doubt() -> None:
-    """A rig has changed, perhaps only its pose: see soon whether its motion is out of date."""
+    """A rig has changed, perhaps only its pose: check soon whether its motion is out of date."""
     _wanted["closely"] = True
     if not _work:
         request()
@@ -59,7 +59,7 @@ def look() -> float | None:
     if (wait := _wanted["at"] - time.perf_counter()) > 0:
         return wait
     scenes = scenes_shown()
-    if _work and _work[0][0] not in {scene.name_full for scene in scenes}:  # others are shown since
+    if _work and _work[0][0] not in {scene.name_full for scene in scenes}:  # other scenes are shown now
         _work.clear()
     if not _work:
         if _wanted["closely"]:
@@ -86,7 +86,7 @@ def look() -> float | None:
 
 
 def _todo(scenes: list) -> tuple | None:
-    """The next (scene, armature) to sample; an armature that is in several scenes moves as in the first of them."""
+    """The next (scene, armature) to sample; an armature in several scenes moves as in the first of them."""
     seen = set()
     for scene in scenes:
         for armature in needs_sampling(scene):
@@ -97,7 +97,7 @@ def _todo(scenes: list) -> tuple | None:
 
 
 def _go_on() -> None:
-    """Sample the armature in work for SLICE; afterwards `_work` is empty if it is done, or has failed."""
+    """Sample the current armature for SLICE; afterwards `_work` is empty if it is done or has failed."""
     _, name, slices = _work[0]
     try:
         for done, total in slices:

@@ -25,21 +25,22 @@ PLATFORMS = {
 PYTHONS = ("3.11", "3.13")
 """Of Blender 4.2 to 5.0, and of 5.1 and later."""
 PINNED = ("onnxruntime", "usd-core")
-"""Packages that come along as `constraints.txt` has them. numpy is Blender's own; see LEGACY_TOO."""
+"""Packages that are included in the versions of `constraints.txt`. numpy is Blender's own; see LEGACY_TOO."""
 HELD_BACK = {"scipy": "1.15.3"}
 """The newest that runs on the numpy 1.24 of Blender 4.2 and has wheels for both Pythons."""
 OLDER = {"macos-x64": {"onnxruntime": "1.23.2"}, "windows-x64": {"onnxruntime": "1.20.1"}}
-"""The last with wheels for Intel Macs, which on Linux gives the same points as the newest, bit for bit; and the last that begins
-with the C++ runtime that Blender 4.2 to 5.0 bring along on Windows (14.29: later ones want 14.40), 0.05 mm off at most.
+"""The last version with wheels for Intel Macs, which on Linux gives the same points as the newest, bit for bit; and the last that
+starts with the C++ runtime that Blender 4.2 to 5.0 ship on Windows (14.29: later ones need 14.40), 0.05 mm off at most.
 """
 BLENDERS_OWN = {"windows-x64": ("usd-core",)}
-"""What is left to Blender, which has it, too: Windows would take Blender's usd_ms.dll for that of usd-core, which is called so."""
+"""What is left to Blender, which has it, too: Windows would confuse Blender's usd_ms.dll with that of usd-core, which has the same
+name."""
 ENDED = {"macos-x64": ("3.13",)}
 """Pythons that no Blender of a platform has: the last for Intel Macs is 4.5 LTS."""
 LEGACY = ("linux-x64", "3.11")
 """What the zip for Blender before 4.2 is built for: Linux distributions, which still carry it."""
 LEGACY_TOO = ("numpy",)
-"""What that one has besides: Debian's Blender comes without numpy. Where there is one, that is found first."""
+"""What the legacy zip also has: Debian's Blender comes without numpy. If there is one, it is found first."""
 NOT_SHIPPED = ("build.py", "__pycache__")
 
 
@@ -78,7 +79,7 @@ def own_wheel(folder: Path) -> Path:
 
 
 def compiled(pinned: Sequence[str] = PINNED) -> dict[str, str]:
-    """Package -> version of what comes along, of the `pinned` as constraints have it."""
+    """Package -> version of what is included; for those `pinned`, the version in the constraints."""
     lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     pins = dict(line.split("==") for line in lines if "==" in line)
     return {name: pins[name] for name in pinned} | HELD_BACK
@@ -118,9 +119,7 @@ def extension(output: Path, platform: str, wheels: list[Path]) -> Path:
 
 
 def legacy(output: Path, wheels: list[Path]) -> Path:
-    """The zip for Blender before 4.2: a folder, with the packages unpacked in it; the first wheel, our own, is there as it
-    is, too.
-    """
+    """The zip for Blender before 4.2: a folder with the packages unpacked in it; the first wheel, our own, is also there as a file."""
     manifest = (HERE / "blender_manifest.toml").read_text(encoding="utf-8")
     out = output / f"neuralocks-{version(manifest)}-legacy-{LEGACY[0]}.zip"
     with Written(out) as archive:

@@ -18,9 +18,9 @@ from .scene.lookup import identity
 from .session import session
 
 ROUNDING = 1e-5
-"""Points that differ by less, relative to the largest coordinate, are the same."""
+"""Points that differ by less than this, relative to the largest coordinate, are the same."""
 KEPT = 7
-"""Earlier changes that are known again."""
+"""How many earlier changes are recognised again."""
 
 
 def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None:
@@ -37,8 +37,8 @@ def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None
 
 
 def intact(hair) -> bool:
-    """Whether the hair has the curves that were written to last, with as many points, each of which then has a rest shape;
-    points that were joined to it may have none.
+    """Whether the hair has the curves that were written to last, with the same number of points. If so, each point has a rest
+    shape; points joined since then may have none.
     """
     before, data = session.written.get(hair.name_full), hair.data
     if before is None or before.of != (identity(hair), identity(data)):
@@ -47,8 +47,8 @@ def intact(hair) -> bool:
 
 
 def touched(hair) -> bool:
-    """Whether something was done to the points since they were written, or their rest shape is gone. Modifiers that went
-    without doing anything are forgotten.
+    """Whether something was done to the points since they were written, or their rest shape is gone. Modifiers that were removed
+    without effect are forgotten.
     """
     before, data = session.written.get(hair.name_full), hair.data
     if before is None or before.of[0] != identity(hair):
@@ -59,12 +59,12 @@ def touched(hair) -> bool:
             return not curves.has_rest(data)
         if before.of[1] == identity(data):
             return True
-    # Other strands, or others' curves, are no edit; what a modifier made of these is, and may be in new curves.
+    # Other strands, or another object's curves, are not an edit; the result of an applied modifier is, and may be in new curves.
     return bool(_applied(hair, before))
 
 
 def follow(hair, sampled, world: np.ndarray) -> None:
-    """Let the rest shape follow what was done to the points since they were written, if anything was.
+    """Apply to the rest shape what was done to the points since they were written, if anything was.
 
     Args:
         hair: the hair object.
@@ -72,12 +72,12 @@ def follow(hair, sampled, world: np.ndarray) -> None:
         world: where it stands now (4, 4).
 
     Raises:
-        NeuralocksError: it cannot, after a modifier was applied to moved hair, say; live is off then.
+        NeuralocksError: it cannot follow, for example after a modifier was applied to moved hair; live is then off.
     """
     name, data = hair.name_full, hair.data
     before = session.written.get(name)
     if before is None and curves.has_rest(data) and _follow_again(hair):
-        sampled.stale = session.wanting = True  # it may have stood otherwise then
+        sampled.stale = session.wanting = True  # it may have stood elsewhere then
     if not touched(hair):
         return
     now = curves.shown(data)
@@ -87,8 +87,8 @@ def follow(hair, sampled, world: np.ndarray) -> None:
         curves.put_aside(data, before.rest)
         if np.array_equal(now, before.points):
             return
-    # What is applied to the points is taken from the object's own transform; or, where its parent's was applied with it,
-    # from where it stands in the world.
+    # What is applied to the points is removed from the object's own transform; or, if its parent's was applied with it, from its
+    # world transform.
     for then, place in zip(before.places, (matrix(hair.matrix_basis), world), strict=True) if same else ():
         change = inverse(place) @ then
         moved = transformed(before.points, change)
@@ -108,7 +108,7 @@ def follow(hair, sampled, world: np.ndarray) -> None:
 
 
 def _applied(hair, before: Written) -> list[str]:
-    """What was done to hair by modifiers that are gone."""
+    """What modifiers that are gone did to the hair."""
     return [f"'{name}' was applied to it" for name in before.modifiers if name not in hair.modifiers]
 
 
@@ -121,7 +121,7 @@ def _refuse(hair, what: str) -> None:
 
 
 def _follow_again(hair) -> bool:
-    """Do to the rest shape what was done to the points, where an undo has brought these back; whether anything was ever
+    """Repeat on the rest shape what was done to the points, if an undo has brought them back; returns whether anything was ever
     done to them.
     """
     data = hair.data

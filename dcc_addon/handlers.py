@@ -32,7 +32,7 @@ def before_frame(*_):
 def on_frame(scene, graph=None):
     """A new frame is evaluated, in the viewport or for a render."""
     graph = graph or bpy.context.evaluated_depsgraph_get()
-    # What others have posed since is evaluated first. Not for a render: its engine would not be told what has changed.
+    # What other handlers have posed since is evaluated first. Not for a render: its engine would not learn what has changed.
     if others_called() and graph.mode == "VIEWPORT" and not session.paused and live.carriers(scene):
         _unseen(graph.update)
     live.update(scene, graph, moved=True)
@@ -70,7 +70,7 @@ def on_update(scene, graph):
 
 @persistent
 def on_load(*_):
-    """Another file: nothing that is known belongs to it."""
+    """Another file was opened: nothing that is known belongs to it."""
     background.cancel()
     session.clear()
     if bpy.data.filepath:
@@ -85,15 +85,15 @@ def on_undo(scene, *_):
     """Undo may have brought back another pose, groom or choice."""
     session.doubt()
     live.forget_gone()
-    background.request()  # what is half sampled holds on to a scene that is no more
+    background.request()  # a half-done sampling refers to a scene that no longer exists
     live.refresh(scene)
     show_rest_left(bpy.data.objects)  # hair as it was before the update that followed a join
 
 
 @persistent
 def before_save(target=None, *_):
-    """The saved file holds the hair at rest, so that it opens right without the add-on; and it finds its models, as far as
-    Blender tells where it will lie, which it does since 4.0.
+    """Save the hair at rest, so that the file opens right without the add-on, and paths with which it finds its models; Blender
+    says since 4.0 where the file will be.
     """
     blur.end()
     for scene in bpy.data.scenes:
@@ -104,7 +104,7 @@ def before_save(target=None, *_):
 
 @persistent
 def after_save(*_):
-    """Go on as before the save, in all scenes; last in the one that is shown, for hair that is in others too."""
+    """Continue as before the save, in all scenes; last in the one shown, because hair may be in several."""
     if session.remade is not None:
         _unseen(session.remade.put_back)
     for scene in sorted(bpy.data.scenes, key=lambda scene: scene == bpy.context.scene):
@@ -113,14 +113,14 @@ def after_save(*_):
 
 @persistent
 def after_import(context, *_):
-    """What was appended finds its models."""
+    """Let appended objects find their models."""
     _unseen(lambda: remake(context.import_items, SETTING.values()))
 
 
 @persistent
 def before_render(scene, *_):
-    """A render must be right: sample now what is out of date, be it that only the pose drawn tells so, and say on the
-    console, which is all that a render farm keeps, which hair will not move.
+    """A render must be right: sample now what is out of date, even if only the drawn pose shows it, and print which hair will not
+    move on the console, which is all that a render farm keeps.
     """
     for drawn in drawn_with(scene):
         with working_in(drawn, layer_shown(drawn)):
@@ -150,7 +150,7 @@ def after_render(*_):
 
 
 def _unseen(change):
-    """Make a change, of settings say, that the live view does not follow at once."""
+    """Make a change, for example of settings, that the live view does not follow at once."""
     session.paused += 1
     try:
         return change()
@@ -174,7 +174,7 @@ def _catch_up() -> None:
 
 
 def _edited(thing) -> bool:
-    """Whether this is live hair that is being edited, or no longer, or was given other strands or points."""
+    """Whether this is live hair that enters or leaves editing, or was given other strands or points."""
     if thing.type != "CURVES" or not thing.neuralocks_hair.live:
         return False
     return thing.mode in EDITING or not known(thing) or touched(thing)
@@ -206,7 +206,7 @@ def attach() -> None:
 
 
 def detach() -> None:
-    """Take them off again."""
+    """Remove them again."""
     for name, handler in HANDLERS.items():
         calls = getattr(bpy.app.handlers, name, None)
         if calls is not None and handler in calls:

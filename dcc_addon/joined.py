@@ -19,9 +19,9 @@ from .session import session
 
 
 def remember(hair, rest: int) -> None:
-    """Note how hair stands whose points have just been written; `rest` is the checksum of `curves.points`."""
+    """Note where hair stands whose points have just been written; `rest` is the checksum of `curves.points`."""
     written = session.written[hair.name_full]
-    # Not read from Blender, which copies all of an attribute that its evaluated hair shares before anybody may look at it.
+    # Not read from Blender, which copies the whole of an attribute shared with the evaluated hair before it can be read.
     session.stood[identity(hair)] = Stood(written.points, written.places[1], written.rest[0], rest)
 
 
@@ -31,8 +31,8 @@ def forget(hair) -> None:
 
 
 def settle(hair) -> None:
-    """Bring the rest shapes of live hair that was joined to this into its space, where that is still to be done: also
-    after an undo, which goes back to what Blender itself had made of it.
+    """Convert the rest shapes of live hair that was joined to this hair into its space, if that is still to be done: also after an
+    undo, which goes back to Blender's own result.
     """
     data, written = hair.data, session.written.get(hair.name_full)
     if written is not None and len(written.points) == len(data.points):
@@ -45,16 +45,16 @@ def settle(hair) -> None:
         for part in _parts(data, stood):
             change = inverse(here) @ stood.world
             moved = transformed(stood.points, change)
-            # Copies have the same rest shape: by the points it is known which of them is where.
+            # Copies have the same rest shape: the points tell which of them is where.
             if np.abs(moved - curves.shown(data)[part]).max() <= ROUNDING * np.abs(moved).max():
                 curves.move_rest(data, change, part)
                 break
 
 
 def _parts(data, stood: Stood) -> list[slice]:
-    """Where points of a hair object have the very rest shape of hair that was joined to it."""
+    """Where points of a hair object have exactly the rest shape of hair that was joined to it."""
     rest, count = curves.points(data), len(stood.points)
-    if count >= len(rest):  # a copy of it that was moved
+    if count >= len(rest):  # a moved copy of it
         return []
     starts = np.flatnonzero((rest == stood.root).all(axis=1))
     parts = [slice(start, start + count) for start in starts.tolist() if start + count <= len(rest)]

@@ -14,9 +14,9 @@ class Prepared(NamedTuple):
 
     Attributes:
         hair: what gives its points.
-        made_of: tells that it must be made again; first the checksum of `rest`.
+        made_of: if it changes, the hair must be made again; begins with the checksum of `rest`.
         rest: points (P, 3) of the groom in the object's space.
-        of, file: tell quickly that the object has other curves (`_which`), or that the model file was replaced.
+        of, file: show quickly that the object has other curves (`_which`), or that the model file was replaced.
     """
 
     hair: LiveHair
@@ -31,7 +31,7 @@ class Bound(NamedTuple):
 
     Attributes:
         bones: the hair bones.
-        modes: by bone, the rotation mode in which it is turned.
+        modes: the rotation mode in which each bone is turned, by bone.
         file: the model file, and a stamp that changes when it is replaced.
     """
 
@@ -49,8 +49,8 @@ class Written(NamedTuple):
         places: the object's transforms (4, 4) then, its own and in the world.
         modifiers: names of its modifiers.
         rest: the rest shape, (P, 3) float32.
-        spare: (P, 3) float32, memory to read the points into that are there now. It is kept, as that of `points` is, from
-            frame to frame: large memory that is asked for anew costs more than what is done in it.
+        spare: (P, 3) float32, memory for reading the current points. Like that of `points`, it is kept from frame to frame:
+            allocating large memory costs more than the work in it.
     """
 
     of: tuple
@@ -62,14 +62,14 @@ class Written(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """What was done to points once. An undo goes back to before it was done to their rest shape, because Blender remembers
-    each step before it tells of it; it is then known again by this.
+    """What was once done to points. An undo goes back to before it was done to their rest shape, because Blender stores each step
+    before it reports it; this lets us recognise it again.
 
     Attributes:
         of: the curves.
         rest: checksum of the rest shape before.
-        points: (P, 3) float32 after.
-        change: the transform (4, 4); or, in words, what cannot be done to the rest shape.
+        points: (P, 3) float32 afterwards.
+        change: the transform (4, 4); or, in words, why the rest shape cannot follow.
     """
 
     of: object
@@ -79,13 +79,13 @@ class Followed(NamedTuple):
 
 
 class Stood(NamedTuple):
-    """How a live hair object was when it was last written.
+    """The state of a live hair object when it was last written.
 
     Attributes:
         points: as shown, (P, 3) float32 in its own space.
         world: where it stood (4, 4).
         root: the first point of its rest shape.
-        rest: checksum of all of them.
+        rest: checksum of all points of its rest shape.
     """
 
     points: np.ndarray

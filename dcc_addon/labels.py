@@ -9,29 +9,29 @@ from .services.wrapping import wrapped
 MARGINS, ICON = 70, 25
 """Width of the sidebar's tabs with the margins of a panel and of a box in it, and of an icon with its space, at scale 1."""
 LEAST = 90
-"""The narrowest line, at scale 1: in a sidebar drawn narrower, lines are cut rather than a letter each."""
+"""The narrowest line, at scale 1: in a narrower sidebar, lines are cut rather than one letter long."""
 
 
 def words(layout, text: str, icon: str, lines: int = 0) -> int:
-    """Show a text in as many lines as it needs, at least `lines`; how many it needs."""
+    """Show a text in as many lines as it needs, at least `lines`; returns how many it needs."""
     found = wrapped(text, *_room(icon))
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number in range(max(lines, len(found))):
         line = found[number] if number < len(found) else ""
-        # As it is: Blender would translate a line that is one of its words, such as an object called Head.
+        # Untranslated: Blender would translate a line that is one of its own words, such as an object called Head.
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE", translate=False)
     return len(found)
 
 
 def _room(icon: str) -> tuple:
-    """How wide a line beside this icon may be, and a function that measures it; without a window letters are counted."""
+    """How wide a line beside this icon may be, and a function that measures lines; without a window it counts letters."""
     region, preferences = bpy.context.region, bpy.context.preferences
     scale = preferences.system.ui_scale
     if not region or not scale:
         return 40, len
     style = preferences.ui_styles[0]
-    letters = getattr(style, "widget_label", None) or style.widget  # Blender 5 has no style of labels alone
+    letters = getattr(style, "widget_label", None) or style.widget  # Blender 5 has no separate style for labels
     blf.size(0, letters.points * scale)
     room = region.width - scale * (MARGINS + (ICON if icon != "NONE" else 0))
     return max(room, scale * LEAST), lambda line: blf.dimensions(0, line)[0]

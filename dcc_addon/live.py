@@ -33,7 +33,7 @@ def rig_toggled(armature, context) -> None:
 
 
 def loop_changed(armature, scene) -> None:
-    """The switch was used that lets the frame range of this character repeat."""
+    """The switch that makes the frame range of this character loop was used."""
     sampled = session.rigs.get(armature.name_full)
     if sampled is not None:
         sampled.clip = replace(sampled.clip, loop=armature.neuralocks_character.loop)
@@ -41,7 +41,7 @@ def loop_changed(armature, scene) -> None:
 
 
 def refresh(scene, wait: bool = False, moved: bool = False) -> None:
-    """Show the hair of the current frame, outside of a frame change; `wait` and `moved` as for `update`."""
+    """Show the hair of the current frame, other than at a frame change; `wait` and `moved` as for `update`."""
     if session.paused or scene is None:
         return
     for layer in _layers(scene):
@@ -49,7 +49,7 @@ def refresh(scene, wait: bool = False, moved: bool = False) -> None:
 
 
 def _layers(scene) -> list:
-    """The view layer in view, and others in which something live moves; none of a scene that has not been shown yet."""
+    """The view layer in view, and others in which something live moves; none if the scene has not been shown yet."""
     in_view = bpy.context.scene == scene
     found = [bpy.context.view_layer] if in_view else [layer for layer in scene.view_layers if layer.depsgraph][:1]
     for armature in carriers(scene) if found else ():
@@ -60,14 +60,13 @@ def _layers(scene) -> list:
 
 
 def update(scene, graph, moved: bool = False, wait: bool = False) -> None:
-    """Move live hair to the pose that `graph` has evaluated; what moves in other view layers only stays as it is.
+    """Move live hair to the pose that `graph` has evaluated; what moves only in other view layers stays as it is.
 
     Args:
-        scene: its frame says the time.
+        scene: its frame gives the time.
         graph: viewport or render depsgraph.
-        moved: whether the frame has just changed, so that a pose unlike the sampled one means that the animation has
-            changed.
-        wait: hair that is not prepared yet is prepared before this returns, not beside Blender.
+        moved: whether the frame has just changed: then a pose unlike the sampled one means that the animation has changed.
+        wait: prepare hair that is not prepared yet before this returns, not in the background.
     """
     if session.paused:
         return
@@ -83,7 +82,7 @@ def update(scene, graph, moved: bool = False, wait: bool = False) -> None:
 
 
 def _update_guest(thing, home, scene, graph, wait: bool) -> None:
-    """The same of what is of the scene `home`, where this one's graph has it. Whether it is out of date is seen there alone."""
+    """The same for a thing of the scene `home` that this scene's graph has. Only there is it checked whether it is out of date."""
     armature = thing if thing.type == "ARMATURE" else thing.neuralocks_hair.armature
     if armature is None or not all(each.evaluated_get(graph).is_evaluated for each in (armature, thing)):
         return
@@ -94,7 +93,7 @@ def _update_guest(thing, home, scene, graph, wait: bool) -> None:
 
 
 def show_rest(scene) -> None:
-    """All live hair of a scene as it was groomed, for as long as nobody refreshes it."""
+    """Show all live hair of a scene as it was groomed, until somebody refreshes it."""
     for hair in live_strands.live_hairs(scene):
         live_strands.show_rest(hair)
     for armature in live_rig.live_armatures(scene):
@@ -102,7 +101,7 @@ def show_rest(scene) -> None:
 
 
 def forget_gone() -> None:
-    """Drop what was told of objects that were renamed or deleted: another one may get such a name."""
+    """Drop messages about objects that were renamed or deleted: another object may get such a name."""
     for told in (session.messages, session.cards):
         for name in [name for name in told if find(name) is None]:
             del told[name]

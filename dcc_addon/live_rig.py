@@ -21,7 +21,7 @@ def live_armatures(scene) -> list:
 
 
 def update(armature, scene, graph, moved: bool = False) -> None:
-    """Turn the hair bones of a live rig; as they were, with a message that says why, where that cannot be."""
+    """Turn the hair bones of a live rig; if that is not possible, restore them, with a message that says why."""
     try:
         _update(armature, scene, graph, moved)
     except NeuralocksError as error:
@@ -35,7 +35,7 @@ def _update(armature, scene, graph, moved) -> None:
         raise unsampled(armature.name_full)
     before = session.chains.get(armature.name_full)
     bones, modes, _ = bound = bind(armature, sampled)
-    if bound is not before:  # another model turned other bones, or a file remembers what nobody can have put aside
+    if bound is not before:  # another model turned other bones, or a file remembers what nobody can have stored
         show_rest(armature)
     joints = pose(armature, sampled, scene, graph, moved)
     settings = armature.neuralocks_character
@@ -44,9 +44,9 @@ def _update(armature, scene, graph, moved) -> None:
         settings.rig_kept = rotations.kept(armature, bones.bones)
     own = armature.pose.bones
     changed = [rotations.turn(own[name], modes[name], turn) for name, turn in zip(bones.bones, turns.tolist())]
-    if any(changed):  # a tag is an update, which calls here again: it must end when nothing changes any more
+    if any(changed):  # a tag causes an update, which calls this again: it must end once nothing changes
         if graph.mode == "RENDER":
-            # What is tagged is copied for the render as it is in the viewport, at another frame: it is animated again.
+            # What is tagged is copied to the render as the viewport has it, at another frame: so it is animated again.
             armature.update_tag(refresh={"OBJECT", "DATA", "TIME"})
         else:
             armature.update_tag()
@@ -67,14 +67,14 @@ def bind(armature, sampled) -> Bound:
 
 
 def rest(armature) -> None:
-    """Give the hair bones the rotations back that they had before."""
+    """Give the hair bones back the rotations that they had before."""
     session.chains.pop(armature.name_full, None)
     show_rest(armature)
 
 
 def show_rest(armature) -> None:
-    """The rotations from before, but for bones that were keyed meanwhile; the model stays bound."""
+    """Restore the earlier rotations, except of bones that were keyed meanwhile; the model stays bound."""
     settings = armature.neuralocks_character
-    if settings.rig_kept:  # to write it is an update, which may call here again
+    if settings.rig_kept:  # writing it is an update, which may call this again
         rotations.give_back(armature, settings.rig_kept, keyed=True)
         settings.rig_kept = ""

@@ -41,9 +41,9 @@ def live_hairs(scene) -> list:
 
 
 def update(hair, scene, graph, moved: bool, wait: bool, home=None) -> None:
-    """Write the points of a hair object for the pose that `graph` has evaluated; rest hair, with a message that says
-    why, where that cannot be, and rest hair while it is being prepared. The arguments are those of `live.update`; `home` is
-    the scene that the hair is in, where that is another one.
+    """Write the points of a hair object for the pose that `graph` has evaluated; rest hair, with a message that says why, if that
+    is not possible, and rest hair while it is being prepared. The arguments are those of `live.update`; `home` is the scene that
+    the hair is in, if that is another one.
     """
     try:
         _update(hair, scene, graph, moved, wait or at_once(graph), home or scene)
@@ -97,8 +97,8 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
     joined.remember(hair, prepared.made_of[0])
     hair.data.update_tag()
     if graph.mode == "RENDER" and bpy.app.version < (4, 0):
-        # The render of an older Blender shows the points of the frame before, unless the object is made anew, too; with its
-        # animation, for it is copied as it is in the viewport, at another frame.
+        # The render of an older Blender shows the points of the previous frame unless the object is updated, too; with its
+        # animation, because it is copied as the viewport has it, at another frame.
         hair.update_tag(refresh={"OBJECT", "DATA", "TIME"})
     session.messages.pop(hair.name_full, None)
 
@@ -112,15 +112,15 @@ def _elsewhere(hair, place: np.ndarray, sampled, row: int, graph) -> bool:
 
 
 def prepare(hair, sampled, wanted: tuple, wait: bool) -> Prepared | None:
-    """The hair bound to its model, prepared once; again where an undo or an edit has changed what it was prepared from.
+    """The hair bound to its model, prepared once, and again if an undo or an edit has changed what it was prepared from.
 
     Args:
-        hair, sampled: the hair object, and how what carries it moves.
+        hair, sampled: the hair object, and the motion of what carries it.
         wanted: arguments of `LiveHair.points` for the frame that is shown.
         wait: prepare it now.
 
     Returns:
-        None while a thread prepares it; the frame is drawn again when that is done.
+        None while a thread prepares it; the frame is drawn again when it is done.
     """
     name = hair.name_full
     if name in session.preparing and not wait:
@@ -147,23 +147,21 @@ def prepare(hair, sampled, wanted: tuple, wait: bool) -> Prepared | None:
 
 
 def known(hair) -> bool:
-    """Whether what was prepared, or is being prepared, is of the curves that this hair object has now."""
+    """Whether what was prepared, or is being prepared, belongs to the curves that this hair object has now."""
     prepared = session.hairs.get(hair.name_full)
     return hair.name_full in session.preparing if prepared is None else prepared.of == _which(hair)
 
 
 def _which(hair) -> tuple:
-    """Curves, their object, and what tells at once that they are others: a later groom may come under the name of one
-    that was deleted, and strands may be added or taken away outside of the modes.
+    """Curves, their object, and what shows at once that they are others: a later groom may get the name of a deleted one, and
+    strands may be added or removed outside of the edit modes.
     """
     data = hair.data
     return identity(data), identity(hair), len(data.points), len(data.curves)
 
 
 def _let_go(of: tuple) -> None:
-    """Give the curves that a live hair object had before it got others their rest shape back, unless another one moves
-    them.
-    """
+    """Restore the rest shape of the curves that a live hair object had before it got others, unless another object moves them."""
     for left in bpy.data.hair_curves:
         if identity(left) == of[0] and left not in _moved():
             curves.restore_rest(left)
@@ -175,13 +173,13 @@ def _moved() -> set:
 
 
 def _recipe(hair, sampled, wanted: tuple):
-    """What the prepared hair is made of, to be compared, and a function of a progress callback that makes it without
-    Blender, with all that its first frame needs.
+    """What the prepared hair is made of, for comparison, and a function of a progress callback that makes it without Blender, with
+    all that its first frame needs.
     """
     name, data, path, character = hair.name_full, hair.data, model_path(hair), sampled.carrying(hair.name_full)
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
     radius, of = curves.radius(data), _which(hair)
-    # The hair keeps its character, so no other one gets its id.
+    # The hair keeps its character alive, so no other one gets its id.
     file = path, stamp(path)
     made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, id(character)
 
@@ -202,7 +200,7 @@ def _arrived(name: str) -> None:
         return
     armature = hair.neuralocks_hair.armature
     shown = [scene for scene in hair.users_scene if any(layer.depsgraph for layer in scene.view_layers)]
-    drawn = {each: home for home in shown for each in drawing(home) if each not in shown}  # where it is a guest
+    drawn = {each: home for home in shown for each in drawing(home) if each not in shown}  # where the hair is a guest
     for scene in sorted([*shown, *drawn], key=lambda scene: scene == bpy.context.scene):
         layer = layer_of(armature, scene) if armature is not None else None
         update(hair, scene, graph_of(scene, layer or layer_shown(scene)), False, False, drawn.get(scene))
@@ -215,15 +213,15 @@ def material(settings) -> np.ndarray:
 
 @lru_cache
 def _log_ratios(*words: str) -> np.ndarray:
-    """Log-ratios (4,) of a material in words. Between two frames nobody moves a slider."""
+    """Log-ratios (4,) of a material in words, cached: between most frames nobody moves a slider."""
     found = Material.parse(words).log_ratios()
     found.flags.writeable = False
     return found
 
 
 def typed(settings, name: str) -> float:
-    """A slider's value as somebody would type it, not as single precision has it, so that a bake made elsewhere with the
-    number shown is the same.
+    """A slider's value as a user would type it, without single-precision digits, so that a bake made elsewhere with the number
+    shown is the same.
     """
     return round(getattr(settings, name), 6)
 
@@ -241,7 +239,7 @@ def rest(hair) -> None:
 
 
 def show_rest_left(things) -> None:
-    """Give those of these curves that nothing live moves their rest shape back: live hair was joined to them, say."""
+    """Restore the rest shape of those curves that nothing live moves: for example, live hair was joined to them."""
     for thing in things:
         if thing.type != "CURVES" or thing.neuralocks_hair.live:
             continue
@@ -250,9 +248,7 @@ def show_rest_left(things) -> None:
 
 
 def show_all_rest() -> None:
-    """Give all curves of the file their rest shapes back, those too that live hair has left behind, in no scene or with
-    no object.
-    """
+    """Restore the rest shapes of all curves of the file, also those that live hair has left behind, in no scene or with no object."""
     for thing in bpy.data.objects:
         if thing.type == "CURVES":
             joined.settle(thing)
@@ -263,14 +259,14 @@ def show_all_rest() -> None:
 
 
 def show_rest(hair) -> None:
-    """Give the hair its rest shape and its modifiers back; what was converted to another type has no rest shape."""
+    """Restore the hair's rest shape and modifiers; hair that was converted to another type has no rest shape."""
     if hair.type == "CURVES" and hair.data.library is None:
         _restore(hair)
     unmute_deformers(hair)
 
 
 def _restore(hair) -> None:
-    """Give the curves of an object their rest shape back, that of hair which was joined to them as well."""
+    """Restore the rest shape of an object's curves, also that of hair joined to them."""
     joined.settle(hair)
     curves.restore_rest(hair.data)
     session.written.pop(hair.name_full, None)

@@ -21,12 +21,12 @@ class Look(NamedTuple):
 
 
 def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
-    """The names of hair objects that can be baked, by look, and what is to be told of the others. The order is that of the
-    names: no slider may exchange the hair of two numbered files, which another scene refers to.
+    """The names of hair objects that can be baked, by look, and notes on the others. They are sorted by name: no slider may swap
+    the hair of two numbered files, which another scene refers to.
 
     Args:
         hairs: hair objects, one at least.
-        undrawn: names of those that nobody will see.
+        undrawn: names of those that are never drawn.
 
     Raises:
         NeuralocksError: one cannot be baked, unless it has no strands or is undrawn; or none can.

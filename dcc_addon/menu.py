@@ -23,22 +23,20 @@ CLASSES = (NEURALOCKS_MT_menu,)
 
 
 def draw(menu, _context) -> None:
-    """The entry in a menu of Blender's."""
+    """Draw the entry in a menu of Blender."""
     menu.layout.separator()
     menu.layout.menu(NEURALOCKS_MT_menu.__name__)
 
 
 def attach() -> None:
-    """Put the menu where the modes of a character and of its hair have theirs; some are younger than the oldest
-    Blender.
-    """
+    """Add the menu to those of the modes of a character and of its hair; some are newer than the oldest Blender."""
     for place in PLACES:
         if hasattr(bpy.types, place):
             getattr(bpy.types, place).append(draw)
 
 
 def detach() -> None:
-    """Take it out again."""
+    """Remove it again."""
     for place in PLACES:
         if hasattr(bpy.types, place):
             getattr(bpy.types, place).remove(draw)

@@ -17,7 +17,7 @@ SETTING = {"strands": "neuralocks_hair.model", "rig": "neuralocks_character.rig_
 
 
 def load_model(found: str) -> StrandModel:
-    """The model of an absolute path, read once while it does not change; calls nothing of Blender."""
+    """The model at an absolute path, read once while it does not change; does not call Blender."""
     now, kept = stamp(found), session.models.get(found)
     if kept is None or kept[0] != now:
         kept = session.models[found] = now, StrandModel.load(found)
@@ -25,7 +25,7 @@ def load_model(found: str) -> StrandModel:
 
 
 def stamp(found: str) -> tuple | None:
-    """A stamp that changes when the file of an absolute path is another one; None where there is none."""
+    """A stamp that changes when the file at an absolute path changes; None if there is none."""
     try:
         status = os.stat(found)
     except OSError:
@@ -34,11 +34,11 @@ def stamp(found: str) -> tuple | None:
 
 
 def model_path(thing, kind: str = "strands") -> str:
-    """Absolute path of the model that the panel names for a hair object, or for an armature with hair bones; the shipped
-    one where it names none.
+    """Absolute path of the model that the panel names for a hair object, or for an armature with hair bones; the shipped one if it
+    names none.
 
     Raises:
-        NeuralocksError: it is named as beside a file, and is not there.
+        NeuralocksError: it is named relative to a file, and is not there.
     """
     path = thing.path_resolve(SETTING[kind])
     if not path.strip():
@@ -54,7 +54,7 @@ def model_path(thing, kind: str = "strands") -> str:
 
 
 def _elsewhere(path: str) -> str:
-    """Where a file that is named as beside this one is instead: beside a library of which something was made local."""
+    """Where a file named relative to this one is instead: beside a library from which something was made local."""
     for library in bpy.data.libraries:
         found = absolute(path, library)
         if os.path.exists(found):

@@ -54,7 +54,7 @@ class NEURALOCKS_PT_character(_Panel, bpy.types.Panel):
 
 
 def _motion(layout, armature, scene) -> None:
-    """How up to date the sampled motion is; in few words, for a narrow sidebar cuts labels beside buttons."""
+    """How up to date the sampled motion is; in few words, because a narrow sidebar cuts labels beside buttons."""
     sampled, character = session.rigs.get(armature.name_full), armature.neuralocks_character
     if sampled is not None and character.body is None and sampled.bodies:
         words(layout, f"Body: {', '.join(sampled.bodies)}", "INFO")
@@ -167,14 +167,14 @@ def _training(layout, settings, kind: str) -> None:
         return
     box = layout.box()
     progress(box, running.done, f"Training {100 * running.done:.0f} %{in_words(running.seconds_left)}")
-    # What is below keeps its place when the numbers, and so perhaps the lines, change.
+    # What is below keeps its place when the numbers, and so perhaps the line count, change.
     running.lines = max(running.lines, words(box, running.message, "NONE", running.lines))
     _notes(box)
     box.operator("neuralocks.cancel_training", icon="CANCEL")
 
 
 def _notes(layout) -> None:
-    """What training says of the character, some of which would save its minutes."""
+    """Training's notes on the character, some of which can save its minutes."""
     for note in notes():
         words(layout, note, "INFO")
 
@@ -210,7 +210,7 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         taking = row.row(align=True)
         taking.enabled = has_keys(armature)
         taking.operator("neuralocks.remove_keys", text="", icon="X")
-        column = layout.column(align=True)  # side by side, a sidebar as wide as it opens would cut them
+        column = layout.column(align=True)  # side by side, a sidebar of default width would cut them
         column.operator("neuralocks.export_skel", text="USD Animation", icon="EXPORT")
         column.operator("neuralocks.export_c", text="C Header", icon="FILE_SCRIPT")
 
@@ -244,8 +244,8 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
 
 
 def findings(armature) -> tuple[list[str], str]:
-    """What is found of the rig, and what is wrong with it or with the body chosen; the rig is looked at again only when
-    bones or choices change.
+    """What is found in the rig, and what is wrong with it or with the chosen body; the rig is examined again only when bones or
+    choices change.
     """
     from .scene import armature as armature_reader
     from .scene.body import left_behind
@@ -275,7 +275,7 @@ def message(layout, name: str) -> None:
 
 
 def hint(text: str) -> dict[str, str]:
-    """What a property shows while it is empty, where Blender can."""
+    """What a property shows while it is empty, if Blender supports that."""
     return {"placeholder": text} if "placeholder" in bpy.types.UILayout.bl_rna.functions["prop"].parameters else {}
 
 

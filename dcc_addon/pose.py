@@ -15,9 +15,8 @@ from .session import session
 
 
 def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np.ndarray:
-    """World joints (J, 4, 4) in the core's space: the sampled ones where the pose drawn is the sampled one, bit for bit
-    as the bake reads them; with `body` in all that the body is moved by, too. Of another pose the joints that are posed
-    otherwise are as drawn.
+    """World joints (J, 4, 4) in the core's space: the sampled ones, bit for bit as the bake reads them, if the drawn pose is the
+    sampled one; with `body`, also in all joints that move the body. In another pose, the joints that differ are as drawn.
     """
     evaluated = armature.evaluated_get(graph)
     if not evaluated.is_evaluated:
@@ -49,8 +48,8 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
 
 
 def _tell_late(name: str) -> None:
-    """Say, also on the console, that the render's pose is not the sampled one: what is posed after a frame change Blender
-    evaluates over the keys of the frame in view, too late for the hair.
+    """Say, also on the console, that the render's pose is not the sampled one: poses set after a frame change are evaluated over
+    the keys of the frame in view, too late for the hair.
     """
     message = (
         f"{name}: the render poses it differently from the view, so hair may be wrong; if a script poses it after each "
@@ -62,7 +61,7 @@ def _tell_late(name: str) -> None:
 
 
 def _hair(armature, sampled) -> np.ndarray:
-    """Which joints (J,) are hair bones that are live or baked themselves, or hang from such."""
+    """Which joints (J,) are hair bones that are live or baked, or are below such bones."""
     turned = as_before(armature)
     found = np.array([bone in turned for bone in sampled.rig.bones])
     for joint, parent in enumerate(sampled.rig.parents) if turned else ():  # parents come first

@@ -16,7 +16,7 @@ def start(name: str, make, then) -> None:
 
     Args:
         name: of the hair object.
-        make: called with a progress callback, gives the prepared hair; calls nothing of Blender.
+        make: called with a progress callback, returns the prepared hair; does not call Blender.
         then: called with the name when the hair is in the session.
     """
     session.preparing[name] = Threaded(make, leave=True).start(), then
@@ -25,14 +25,14 @@ def start(name: str, make, then) -> None:
 
 
 def stop() -> None:
-    """Cancel all; the session forgets what they make."""
+    """Cancel all; the session drops their results."""
     session.stop_preparing_all()
     if bpy.app.timers.is_registered(look):
         bpy.app.timers.unregister(look)
 
 
 def look() -> float | None:
-    """Take over what is ready; the time until the next look, None when nothing is being prepared any more."""
+    """Take over what is ready; the time until the next look, None once nothing is being prepared."""
     for name, entry in list(session.preparing.items()):
         job, then = entry
         if job.running or session.preparing.get(name) is not entry:  # showing one may have stopped or begun others

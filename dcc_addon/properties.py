@@ -12,9 +12,9 @@ from .session import session
 OVERRIDABLE = {"override": {"LIBRARY_OVERRIDABLE"}}
 """A choice made for a library override is saved with it."""
 SETTING = {"options": set()} | OVERRIDABLE
-"""Not to be animated: hair of one frame remembers the motion before it, and a bake has one look."""
+"""Cannot be animated: hair of one frame remembers the motion before it, and a bake has one look."""
 KEPT = {"options": {"HIDDEN"}} | OVERRIDABLE
-"""What is not for the artist's eyes."""
+"""Hidden from the artist."""
 
 
 def _is_armature(_self, candidate) -> bool:
@@ -30,7 +30,7 @@ def _is_hair(_self, candidate) -> bool:
 
 
 def by_script(context) -> bool:
-    """Whether a setting is changed by a script, which goes on with the result, and not in the sidebar."""
+    """Whether a setting is changed by a script, which needs the result at once, and not in the sidebar."""
     return context.area is None or context.area.type not in {"VIEW_3D", "PROPERTIES"}
 
 
@@ -241,7 +241,7 @@ def attach() -> None:
 
 
 def detach() -> None:
-    """Take them off again."""
+    """Remove them again."""
     del bpy.types.Scene.neuralocks
     del bpy.types.Object.neuralocks_character
     del bpy.types.Object.neuralocks_hair

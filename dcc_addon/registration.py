@@ -16,7 +16,7 @@ def register() -> None:
     properties.attach()
     menu.attach()
     handlers.attach()
-    if hasattr(bpy.data, "scenes"):  # while Blender starts no file is open yet; its load calls the handler
+    if hasattr(bpy.data, "scenes"):  # while Blender starts, no file is open yet; loading one calls the handler
         handlers.on_load()
 
 

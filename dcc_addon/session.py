@@ -50,24 +50,24 @@ class SampledRig:
     bind_metres: float = 1.0
     """Metres of one unit of the bind pose: the scene's unit scale, times the size at which the motion shows the head."""
     drawn: np.ndarray = None
-    """Joints (T, J, 4, 4) in Blender's world space as Blender gave them, before they were made channels, float32."""
+    """Joints (T, J, 4, 4) in Blender's world space as Blender gave them, before conversion to channels, float32."""
     own: np.ndarray = None
-    """What the bones' own channels turn and scale, without constraints, (T, J, 3, 3) float32."""
+    """Rotation and scale from the bones' own channels, without constraints, (T, J, 3, 3) float32."""
     rigging: int = 0
-    """How what moves the rig was put together; see `scene.sampling.rigging_of`."""
+    """The setup that moves the rig; see `scene.sampling.rigging_of`."""
     posture: int = 0
-    """How what is not keyed was posed; see `scene.sampling.posture_of`."""
+    """The unkeyed pose; see `scene.sampling.posture_of`."""
 
     carriers: dict[str, int] = field(default_factory=dict)
     """Joints below the head that carry hair objects, by name: the jaw of a beard. All others ride on the head."""
     carried: dict[int, Character] = field(default_factory=dict)
-    """The character with such a joint, made once; see `carrying`."""
+    """The character with each such joint, made once; see `carrying`."""
     bodies_off: tuple[str, ...] = ()
-    """What to say of bodies that are drawn elsewhere than hair is kept out of; see `scene.body_drawn`."""
+    """Notes on bodies that are drawn elsewhere than where hair is kept out of them; see `scene.body_drawn`."""
     leaps: tuple[str, ...] = ()
-    """What to say of frames at which the character is put elsewhere; see `services.leaps`."""
+    """Notes on frames at which the character jumps; see `services.leaps`."""
     hairs_off: dict[str, str] = field(default_factory=dict)
-    """What to say of hair objects, by name, that do not go with the head; see `scene.riding`."""
+    """Notes on hair objects, by name, that do not move with the head; see `scene.riding`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -75,7 +75,7 @@ class SampledRig:
         return self.key[1]
 
     def carrying(self, hair: str) -> Character:
-        """The character as it carries a hair object: the very same one as long as it stays the same."""
+        """The character as it carries a hair object: the identical object as long as it stays the same."""
         joint = self.carriers.get(hair)
         if joint is None:
             return self.character
@@ -106,7 +106,7 @@ class Session:
     followed: list[Followed] = field(default_factory=list)
     """What was done to the points of live hair; see `edited`."""
     stood: dict[object, Stood] = field(default_factory=dict)
-    """How live hair objects stood then, by identity, those that are gone too; see `joined`."""
+    """How live hair objects stood when last written, by identity, also those that are gone; see `joined`."""
     preparing: dict[str, tuple[Threaded, Callable[[str], None]]] = field(default_factory=dict)
     """Hair objects that a thread is preparing, with what is called with the name when that is done."""
     readers: dict[str, PoseReader] = field(default_factory=dict)
@@ -116,9 +116,9 @@ class Session:
     """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
     messages: dict[str, str] = field(default_factory=dict)
     trained: tuple[str, bool] | None = None
-    """What became of the last training, and whether that is good news."""
+    """How the last training ended, and whether that is good news."""
     trained_notes: list[str] = field(default_factory=list)
-    """What else is to be known of it."""
+    """Further notes on it."""
     cards: dict[str, list[str]] = field(default_factory=dict)
     paused: int = 0
     """Above zero while frames are stepped for sampling: the live view then stays out of the way."""
@@ -136,9 +136,9 @@ class Session:
     edits: int = 0
     """How often animation was edited: what was sampled meanwhile is out of date."""
     wanting: bool = False
-    """Whether live hair found its motion missing or out of date since somebody last saw to it."""
+    """Whether live hair found its motion missing or out of date since this was last handled."""
     remade: Remade | None = None
-    """Paths that were written anew for the save that goes on; see `scene.save_as`."""
+    """Paths that were rewritten for the current save; see `scene.save_as`."""
     doubtful: set[str] = field(default_factory=set)
     """Prepared hair whose groom or choices may have changed."""
 
@@ -159,7 +159,7 @@ class Session:
         self.messages.pop(name, None)
 
     def forget_motion(self, name: str) -> None:
-        """Drop what was sampled of an armature, and the hair that it carries."""
+        """Drop an armature's sampled motion, and the hair that it carries."""
         sampled = self.rigs.pop(name, None)
         for hair in sampled.motion.places if sampled is not None else ():
             self.stop_preparing(hair)
@@ -170,7 +170,7 @@ class Session:
         self.messages.pop(name, None)
 
     def renew_motion(self, name: str, sampled: SampledRig, reader) -> None:
-        """Put in what was sampled of an armature; hair prepared for the very same character stays, to be looked at."""
+        """Store an armature's sampled motion; hair prepared for the same character stays, and is checked before use."""
         before = self.rigs.get(name)
         if before is not None and before.character is sampled.character:
             self.doubtful.update(before.motion.places)
@@ -179,12 +179,12 @@ class Session:
         self.rigs[name], self.readers[name] = sampled, reader
 
     def clear(self) -> None:
-        """Forget everything, at file load and when the add-on goes; who steps frames meanwhile still has to end it."""
+        """Forget everything, at file load and when the add-on is disabled; whoever is stepping frames must still end that."""
         self.stop_preparing_all()
         self.__init__(paused=self.paused, working=self.working)
 
     def tell(self, name: str, error: Exception) -> None:
-        """Say in the panel what went wrong with an object; what its user cannot mend is on the console as well."""
+        """Say in the panel what went wrong with an object; what its user cannot fix is on the console as well."""
         if isinstance(error, (NeuralocksError, ReferenceError)):
             self.messages[name] = str(error)
         else:

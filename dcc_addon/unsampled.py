@@ -8,12 +8,12 @@ from neuralocks_core.errors import NeuralocksError
 from .session import session
 
 FIRST = "its motion is sampled as soon as playback stops; then the hair moves"
-"""What an artist has to wait for, and need not see to."""
+"""What an artist has to wait for, without doing anything."""
 
 
 def unsampled(name: str, why: str = "its motion is not sampled yet") -> NeuralocksError:
-    """The error that an armature's motion is unknown, which asks for it: with a window it is sampled in the background,
-    unless that has failed.
+    """The error that an armature's motion is unknown. Making it requests the motion: with a window, it is sampled in the
+    background, unless that has failed.
     """
     session.wanting = True
     told = f"{why}; press Sample Motion" if bpy.app.background or name in session.failed else FIRST

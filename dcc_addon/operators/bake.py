@@ -44,19 +44,19 @@ def output_path(path: str) -> str:
         raise NeuralocksError(f"{path}: this is a folder; name a file in it")
     if not full.lower().endswith((".usd", ".usda", ".usdc")):
         full += ".usdc"
-    folder = next((p for p in Path(full).parents if os.path.isdir(p)), None)  # the others are made
+    folder = next((p for p in Path(full).parents if os.path.isdir(p)), None)  # missing folders are made
     if folder is None or not os.access(folder, os.W_OK):
         raise NeuralocksError(f"{full}: the folder cannot be written; choose another one")
     return full
 
 
 def shot_beside(out: Path) -> Path:
-    """The file of the character at rest and in motion that a bake goes over."""
+    """The shot that a bake goes over: the character at rest and in motion."""
     return out.with_name(f"{out.stem}_shot.usdc")
 
 
 def is_anothers(out: Path, character: str) -> bool:
-    """Whether the bake `out` that is there, if any, is of another character than that of this full name."""
+    """Whether an existing bake `out` belongs to another character than the one of this full name."""
     from usd.assets.own_layers import character_of
 
     shot = shot_beside(out)
@@ -90,10 +90,10 @@ class Baked(NamedTuple):
 
 
 def bake_steps(context, armature, hairs, path: str, undrawn=()):
-    """Sample, write the shot beside the bake, bake it; yields (done, total, message), returns what was `Baked`.
+    """Sample, write the shot beside the bake, and bake it; yields (done, total, message), returns what was `Baked`.
 
-    The same functions that the command line calls, on a stage that holds the numbers of the live view. Hair with a name
-    among `undrawn` is invisible in the file. Where another character's hair is in the file, this one's gets another name.
+    This calls the same functions as the command line, on a stage with the numbers of the live view. Hair with a name in `undrawn`
+    is invisible in the file. If another character's hair is in the file, this one's gets another name.
     """
     scene = context.scene
     full = output_path(path)
@@ -149,7 +149,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
 
 
 def _outs(path: Path, count: int) -> list[Path]:
-    """The files of a bake of so many looks."""
+    """The files of a bake with this many looks."""
     return [path if count == 1 else path.with_name(f"{path.stem}_{n + 1}{path.suffix}") for n in range(count)]
 
 
@@ -210,7 +210,7 @@ class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):
     def steps(self, context):
         hair = shown_hair(context)
         attach.check_own(hair)
-        show_rest(hair)  # live hair has modifiers off, too, and has them off again at once
+        show_rest(hair)  # live hair also has modifiers off, and switches them off again at once
         found = attach.detach(hair)
         refresh(context.scene)
         yield 1, 1, ""
@@ -237,7 +237,7 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
 
 
 def _card(path: str, prims: dict[str, str]):
-    """Steps of measuring a bake of the objects that are these prims, by name; returns the lines of its card."""
+    """Steps of measuring a bake of the objects with these prims, by name; returns the lines of its card."""
     from ..services.card import lines_of
 
     yield from loading("usd.review.evaluate")

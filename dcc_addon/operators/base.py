@@ -28,11 +28,11 @@ ONCE = {"options": {"SKIP_SAVE"}}
 FILE_ONCE = FILE | {"options": FILE["options"] | ONCE["options"]}
 
 _running: list["Stepwise"] = []
-"""The operator at work over several slices, one at most."""
+"""The operator that is working over several slices, one at most."""
 
 
 def stop() -> None:
-    """End what is at work when the add-on is disabled: Blender removes the operator without telling it."""
+    """End the running work when the add-on is disabled: Blender removes the operator without telling it."""
     if _running:
         _running[0].cancel(bpy.context)
 
@@ -46,7 +46,7 @@ class Hardened:
         return self.guarded(lambda: self.work(context))
 
     def guarded(self, function):
-        """Run it; a user's error becomes a report, any other one too, with its traceback on the console."""
+        """Run it; a user's error becomes a report, and so does any other error, with its traceback on the console."""
         try:
             message = function()
         except NeuralocksError as error:
@@ -71,7 +71,7 @@ class Stepwise(Hardened):
     """Long work as a generator `steps(context)` of (done, total, message): at once from scripts, with progress and
     Esc from the panel.
 
-    Between two slices, in which the artist may do anything, the scene is at the artist's frame.
+    Between two slices, when the artist may do anything, the scene is at the artist's frame.
     """
 
     def work(self, context):
@@ -92,7 +92,7 @@ class Stepwise(Hardened):
         self._steps, self._left = self.steps(context), TimeLeft()
         session.working = self.bl_label
         _running[:] = [self]
-        background.request()  # what is half sampled begins anew afterwards
+        background.request()  # a half-done sampling starts anew afterwards
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0, 1000)
@@ -122,7 +122,7 @@ class Stepwise(Hardened):
     def _close(self):
         try:
             self._steps.close()
-        except ReferenceError:  # what would be put back is gone
+        except ReferenceError:  # what would be restored is gone
             pass
 
     def _slice(self, context):
@@ -156,8 +156,8 @@ class Stepwise(Hardened):
 
 
 def sampling(context, armature, share: float = 1.0):
-    """Steps (done, total, message) of sampling an armature's motion, the first `share` of longer work, at once where nobody
-    can do anything meanwhile; returns its `SampledRig`.
+    """Steps (done, total, message) of sampling an armature's motion, the first `share` of longer work; in one go if nobody can do
+    anything meanwhile. Returns its `SampledRig`.
     """
     name = armature.name_full
     for done, total in in_slices(context, armature, SAMPLED if _running else math.inf):
@@ -166,7 +166,7 @@ def sampling(context, armature, share: float = 1.0):
 
 
 def tell(operator, message: str, notes: list[str]) -> None:
-    """Report how it ended, and then what else is to be known: Blender shows the last line longest."""
+    """Report how it ended, and then other notes: Blender shows the last line longest."""
     operator.report({"INFO"}, message)
     for note in notes:
         operator.report({"WARNING"}, note)
@@ -188,7 +188,7 @@ def shown_hair(context, armature=None):
     """The hair object that the panel shows; of this armature, if one is given.
 
     Raises:
-        NeuralocksError: there is none, it was converted to something else, or it belongs to another character.
+        NeuralocksError: there is none, it was converted to another type, or it belongs to another character.
     """
     hair = context.scene.neuralocks.hair
     if hair is None or not in_scene(hair, context.scene):

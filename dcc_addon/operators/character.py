@@ -24,7 +24,7 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
 
     def work(self, context):
         settings, scene = context.scene.neuralocks, context.scene
-        # An override before the linked object that it is made of, which may be in the scene too.
+        # An override comes before the linked object that it overrides, which may be in the scene too.
         local = sorted(scene.objects, key=lambda thing: thing.library is not None)
         selected, chosen = context.selected_objects, [*context.selected_objects, *local]
         armatures, hairs = ([o for o in chosen if o.type == kind] for kind in ("ARMATURE", "CURVES"))
@@ -43,8 +43,8 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
 
 
 def _character(armatures, hairs, selected, things):
-    """The armature that is selected, or carries selected hair, or a mesh; else the first of the scene that carries hair,
-    that deforms a mesh, or that there is: a rig's template may lie beside it.
+    """The armature that is selected, or carries selected hair or a mesh; otherwise the first in the scene that carries hair, that
+    deforms a mesh, or the first of all: a rig's template may be beside it.
     """
     if armatures[0] in selected:
         return armatures[0]
@@ -55,16 +55,14 @@ def _character(armatures, hairs, selected, things):
 
 
 def _hair(hairs, armature, armatures):
-    """The first hair of an armature, else that of none of them; None where all of it is that of others."""
+    """The first hair of an armature, otherwise the first that has no armature; None if all hair is that of others."""
     others = {other for other in armatures if other != armature}
     free = [hair for hair in hairs if _carrier(hair, armature) not in others]
     return next(iter(sorted(free, key=lambda hair: _carrier(hair) != armature)), None)
 
 
 def _carrier(thing, shown=None):
-    """The armature that a hair object belongs to, or that moves it or a mesh; the one that is `shown` where that does, or
-    none does.
-    """
+    """The armature that a hair object belongs to, or that moves it or a mesh; the one `shown` if that does, or none does."""
     return thing.neuralocks_hair.armature or carrier(thing, shown)
 
 

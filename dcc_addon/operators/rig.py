@@ -68,7 +68,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
                 armature = named(name)
                 bones = bind(armature, sampled).bones
                 actions.check_mode_left(armature, bones.bones)
-        finally:  # whatever keeps the new keys from being made leaves earlier ones, and Live, as they were
+        finally:  # if the new keys cannot be made, earlier ones, and Live, stay as they were
             refresh(scene)
         frames = frame_numbers(first, last, scene.neuralocks.subframes)
         turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
@@ -93,7 +93,7 @@ class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
         if not actions.has_keys(armature):
             raise NeuralocksError(f"{armature.name_full}: it has no baked hair keys; bake them first")
         actions.check_lasting(armature)
-        show_rest(armature)  # what Live keeps was turned by the keys; it puts aside anew how the bones are without them
+        show_rest(armature)  # what Live stored was turned by the keys; it now stores how the bones are without them
         library = actions.remove(armature)
         refresh(context.scene)
         return f"{armature.name_full}: baked hair keys {f'of {library} muted here' if library else 'removed'}"
@@ -126,7 +126,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         shot = shot_beside(out)
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name), share=0.5)
-        bind(named(name), sampled)  # says what is wrong before anything is written
+        bind(named(name), sampled)  # reports what is wrong before anything is written
         head, loop = sampled.character.skeleton.names[sampled.character.head], sampled.clip.loop
         with undone_on_failure(out, shot):
             prims = write_shot(shot, named(name), scene, sampled, [])
@@ -161,7 +161,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
         if out.is_dir():
             raise NeuralocksError(f"{path}: this is a folder; name a header file in it")
         sampled, model = ensure(context, armature), RigModel.load(model_path(armature, "rig"))
-        # Says where the model is another rig's, as the shipped one is.
+        # Reports if the model belongs to another rig, as the shipped one does.
         LiveBones.of(model, sampled.rig, sampled.character)
         check_ours([out, example_beside(out)], made_here)
         export_c(model, out)

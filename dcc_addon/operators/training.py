@@ -31,7 +31,7 @@ from ..session import session
 from .base import ONCE, Hardened, Stepwise, sampling, shown_armature, shown_hair
 
 _running: list["_Training"] = []
-"""One at most. Not of the session, which ends with its file: a training goes on while other files are opened."""
+"""One at most. Not in the session, which ends with its file: a training continues while other files are opened."""
 _trainers = Trainers()
 
 
@@ -41,12 +41,12 @@ def job() -> TrainingJob | None:
 
 
 def notes() -> list[str]:
-    """What an artist should know of the training that runs, or else of the last one, in the words of the panel."""
+    """What an artist should know about the running training, or else the last one, in the words of the panel."""
     return _running[0].notes() if _running else session.trained_notes
 
 
 def stop() -> None:
-    """Cancel what runs and forget it."""
+    """Cancel the running training and forget it."""
     if _running:
         _running[0].job.cancel()
         _running[0].folder.cleanup()
@@ -64,8 +64,8 @@ def training_python() -> str:
 
 
 def known_problem() -> str | None:
-    """Why training cannot run here, with the remedy; None while the interpreter is first asked, which takes seconds. It is
-    asked again where it could not, and the panel drawn again with its answer.
+    """Why training cannot run here, with the remedy; None while the interpreter is first asked, which takes seconds. One that could
+    not train is asked again, and the panel is redrawn with its answer.
     """
     answer = _trainers.known(training_python())
     if _trainers.asking and not bpy.app.timers.is_registered(await_answer):
@@ -74,7 +74,7 @@ def known_problem() -> str | None:
 
 
 def await_answer() -> float | None:
-    """Blender's timer: draws the panel once an interpreter has answered; seconds until the next look, None then."""
+    """Blender's timer: redraws the panel once an interpreter has answered; seconds until the next look, or None then."""
     if _trainers.asking:
         return 0.2
     redraw()
@@ -114,7 +114,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
             raise NeuralocksError("Training: one is running already; wait for it or cancel it")
         armature, scene = shown_armature(context), context.scene
         target = shown_hair(context, armature) if self.kind == "strands" else armature
-        check_own(target)  # it is given the model
+        check_own(target)  # it gets the model
         if self.kind == "strands":
             curves.check(target)
         python, name, wanted = training_python(), armature.name_full, target.name_full
@@ -162,7 +162,7 @@ class NEURALOCKS_OT_cancel_training(Hardened, bpy.types.Operator):
 
 
 class _Target(NamedTuple):
-    """What a training is for: the object, and the file that it is in, for one of its name in another file is not meant."""
+    """What a training is for: the object and the file that it is in, since an object of its name in another file is not meant."""
 
     name: str
     kind: str
@@ -174,7 +174,7 @@ class _Target(NamedTuple):
         return cls(thing.name_full, kind, identity(thing), bpy.data.filepath)
 
     def found(self):
-        """The object, renamed perhaps or of its file opened anew; None where there is none here."""
+        """The object, even if it was renamed or its file was reopened; None if it is not in this file."""
         thing = identified(self.identity)
         if thing is None and self.file and self.file == bpy.data.filepath:
             thing = find(self.name)
@@ -182,7 +182,7 @@ class _Target(NamedTuple):
 
 
 class _Training(NamedTuple):
-    """A process at work, what it is for, and the folder with what it reads, whose prims are of these objects."""
+    """A running process, what it is for, the folder with what it reads, and the objects of the prims in it."""
 
     job: TrainingJob
     target: _Target
@@ -190,7 +190,7 @@ class _Training(NamedTuple):
     prims: dict[str, str]
 
     def notes(self) -> list[str]:
-        """What it says, of objects and in the words of the panel."""
+        """Its notes, about objects and in the words of the panel."""
         return [for_the_panel(with_objects(note, self.prims)) for note in self.job.notes]
 
 
@@ -210,7 +210,7 @@ def finish() -> str | None:
     else:
         setting = SETTING[wanted.kind]
         set_path(target, setting, named_here(running.out))
-        if library_of(target, setting) is not None:  # of an override the same words mean beside its own file
+        if library_of(target, setting) is not None:  # for an override, the same path is relative to its own file
             set_path(target, setting, running.out)
         _remember()
         message, well = f"{target.name_full}: trained", True
@@ -221,13 +221,13 @@ def finish() -> str | None:
 
 
 def _remember() -> None:
-    """A step to undo: without one the next undo, of whatever was done before, would take the model away."""
+    """Push an undo step: without one, the next undo, of an earlier action, would also remove the model."""
     if bpy.app.background:
         return
     try:
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
             bpy.ops.ed.undo_push(message="Trained model")
-    except (RuntimeError, IndexError, AttributeError):  # no window, or one that takes none now
+    except (RuntimeError, IndexError, AttributeError):  # no window, or one that takes no undo step now
         pass
 
 
@@ -244,8 +244,8 @@ def watch() -> float | None:
 
 
 def _reserved(name: str) -> str:
-    """A new model file beside the .blend, or in the user's own folder while that is not saved; reserved, for another Blender may
-    train for a character of the same name, or one may be kept to be resumed on the command line.
+    """A new model file beside the .blend, or in the user's own folder while that is not saved; reserved, because another Blender
+    may train for a character of the same name, or a file may be kept to be resumed on the command line.
     """
     label = file_label(name)
     folder = (

@@ -16,32 +16,32 @@ from .relations import found_anew
 TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
 """NLA tracks of the hair's motion and, below it, of what the hair bones did before."""
 OVERRIDE = " (Override)"
-"""How the names of both end on an overridden character, whose own file may have tracks of them: Blender knows them by name,
-and would give these what the new ones have."""
+"""Suffix of both names on an overridden character, whose own file may have such tracks: Blender identifies tracks by name, and
+would give those the content of the new ones."""
 HAIR = TRACK, BEFORE, TRACK + OVERRIDE, BEFORE + OVERRIDE
-"""All of them."""
+"""All names of these tracks."""
 KEPT = "neuralocks_rotations"
-"""Property of the action with how the hair bones were turned before."""
+"""Property of the action that holds the hair bones' earlier rotations."""
 STILL = 1e-6
-"""Rotations that change by less over time do not move."""
+"""Rotations that change by less than this over time do not move."""
 
 
 def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.ndarray):
-    """Key the rotations of the hair bones and put them on a strip above all other animation, in place of an earlier bake;
-    on one below it what they did before, for Blender leaves at its last value what a muted strip writes no more.
+    """Key the rotations of the hair bones and put them on a strip above all other animation, in place of an earlier bake. A strip
+    below it holds what they did before, because Blender leaves a channel at its last value when its strip is muted.
 
     Args:
         armature: the armature object.
         bones: bone names, (N).
         frames: (T,), as animation counts them.
-        turns, own: rotations (T, N, 4) wxyz with the hair's motion and without.
+        turns, own: rotations (T, N, 4) wxyz with and without the hair's motion.
 
     Returns:
         the action of the hair's motion.
     """
     remove(armature)
     data = armature.animation_data or armature.animation_data_create()
-    # Keys of the artist's own on a bone, which may lie in the action above all strips, stay and have no effect.
+    # The artist's own keys on a bone, which may be in the action above all strips, stay and have no effect.
     modes = rotations.free_modes(armature, bones, rotations.KEYED, without=HAIR)
     before = rotations.kept(armature, bones)
     for name in bones:
@@ -60,16 +60,16 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
 
 
 def check_heard(armature) -> None:
-    """Refuse where baked keys would not be heard.
+    """Refuse an armature on which baked keys would have no effect.
 
     Raises:
-        NeuralocksError: a strip is being tweaked, strips are switched off, or those of another track alone play, or will when
-            the file is opened again.
+        NeuralocksError: a strip is being tweaked, strips are switched off, or only another track plays, or will when the file is
+            reopened.
     """
     name, data = armature.name_full, armature.animation_data
     if data is None:
         return
-    if data.use_tweak_mode:  # the action that plays above all strips, perhaps on hair bones, is out of reach meanwhile
+    if data.use_tweak_mode:  # the action above all strips, perhaps on hair bones, cannot be reached in tweak mode
         raise NeuralocksError(
             f"{name}: an NLA strip is being edited (tweak mode); leave it first (Tab in the NLA editor)"
         )
@@ -86,7 +86,7 @@ def check_heard(armature) -> None:
 
 
 def check_lasting(armature) -> None:
-    """Refuse where an earlier bake cannot be taken off an overridden character for good.
+    """Refuse an overridden character from which an earlier bake cannot be removed for good.
 
     Raises:
         NeuralocksError: a track of it from the character's own file is solo.
@@ -100,10 +100,10 @@ def check_lasting(armature) -> None:
 
 
 def check_mode_left(armature, bones) -> None:
-    """Refuse bones on which baked keys would have no effect, or another one.
+    """Refuse bones on which baked keys would have no effect, or a wrong one.
 
     Raises:
-        NeuralocksError: one has keys in every rotation mode, or of the mode itself.
+        NeuralocksError: a bone has keys in every rotation mode, or on the mode itself.
     """
     written = animated(armature.animation_data, without=HAIR)
     for bone in bones:
@@ -126,21 +126,21 @@ def has_keys(armature) -> bool:
 
 
 def beside_others(armature) -> bool:
-    """Whether its hair bones are baked and play beside all else: with the star of a track of theirs nothing else does."""
+    """Whether its hair bones are baked and play besides everything else: if their track is solo, nothing else plays."""
     return has_keys(armature) and not any(track.is_solo for track in _tracks(armature))
 
 
 def as_before(armature) -> dict[str, dict[str, list]]:
-    """Channels of the hair bones that are live or baked, by bone and name, as they are without the hair's motion."""
+    """Channels of live or baked hair bones, by bone and name, as they are without the hair's motion."""
     kept = rotations.kept_in(armature.neuralocks_character.rig_kept)
-    for action in _actions(armature):  # Live over baked keys has put aside what these write
+    for action in _actions(armature):  # Live over baked keys has stored what the keys write
         kept |= rotations.kept_in(action.get(KEPT, ""))
     return {name: dict(zip(rotations.KEPT, values)) for name, values in kept.items()}
 
 
 def remove(armature) -> str:
-    """Take an earlier bake off and turn the bones as they were before it. Tracks from the file of an overridden character,
-    which Blender would bring back when this one is opened, are muted; gives that file's name, empty where there are none.
+    """Remove an earlier bake and turn the bones as they were before it. Tracks from the file of an overridden character, which
+    Blender would bring back when this file is opened, are muted; returns that file's name, empty if there are none.
     """
     tracks, actions, lasting = _tracks(armature), _actions(armature), _of_library(armature)
     muted = _library(armature) if any(track in lasting for track in tracks) else ""
@@ -159,7 +159,7 @@ def remove(armature) -> str:
 
 @contextmanager
 def without(armature):
-    """Meanwhile an earlier bake is off, and the bones are turned as they were before it."""
+    """In this block, an earlier bake is off, and the bones are turned as they were before it."""
     number, tracks = identity(armature), {track.name: (track.mute, track.is_solo) for track in _tracks(armature)}
     before = [action.get(KEPT, "") for action in _actions(armature)]
     turned = rotations.kept(armature, [bone for text in before for bone in rotations.kept_in(text)])
@@ -171,7 +171,7 @@ def without(armature):
             rotations.give_back(armature, text)
         yield
     finally:
-        armature = identified(number)  # found anew: an undo may have come between
+        armature = identified(number)  # looked up again: there may have been an undo
         for track in _named(armature) if armature is not None else ():
             track.mute, solo = tracks.get(track.name, (track.mute, False))
             if solo:
@@ -179,24 +179,24 @@ def without(armature):
         if armature is not None:
             rotations.give_back(armature, turned)
             if not _others_play(armature):
-                found_anew()  # what was looked at meanwhile had no keys
+                found_anew()  # Blender looked at the rig while it had no keys
 
 
 def _others_play(armature) -> bool:
-    """Whether anything else than the hair's tracks is animation of this armature."""
+    """Whether anything other than the hair's tracks animates this armature."""
     data = armature.animation_data
     return bool(data) and (bool(data.action) or any(not t.mute and t.name not in HAIR for t in data.nla_tracks))
 
 
 def _unstar(track) -> None:
-    """Let a track play no longer alone: it would do so although it is muted, and leave all others silent when it is gone."""
-    if track.is_solo:  # to say so of any other one takes the star off that which has it
+    """End the solo of a track: it would play alone although it is muted, and leave all others silent when it is gone."""
+    if track.is_solo:  # clearing it on any other track would clear the star of the one that has it
         track.is_solo = False
 
 
 def _tracks(armature) -> list:
-    """Tracks of an earlier bake; without those from the file of an overridden character where all of these are muted, for
-    that is how they are taken off.
+    """Tracks of an earlier bake; without those from the file of an overridden character if all of them are muted, because that is
+    how they are removed.
     """
     lasting = _of_library(armature)
     off = all(track.mute and not track.is_solo for track in lasting)
@@ -204,13 +204,13 @@ def _tracks(armature) -> list:
 
 
 def _named(armature) -> list:
-    """Tracks of the hair's names."""
+    """Tracks with the hair's names."""
     data = armature.animation_data
     return [track for track in data.nla_tracks if track.name in HAIR] if data else []
 
 
 def _of_library(armature) -> list:
-    """Those of them that an overridden character has from its own file."""
+    """Those tracks that an overridden character has from its own file."""
     return [track for track in _named(armature) if track.is_override_data] if armature.override_library else []
 
 
@@ -249,7 +249,7 @@ def _action(armature, label: str, modes: dict[str, str], frames: np.ndarray, tur
 
 
 def _curves(action, armature):
-    """Where F-curves go: in Blender 4.4 and later into a channel bag of the action's slot for this armature."""
+    """Where F-curves go: in Blender 4.4 and later, into a channel bag of the action's slot for this armature."""
     if not hasattr(action, "slots"):
         return action.fcurves
     slot = action.slots.new("OBJECT", armature.name)
@@ -258,7 +258,7 @@ def _curves(action, armature):
 
 
 def _new_curve(curves, path: str, index: int, group: str):
-    """A curve in a group of its bone; how the group is named has changed twice."""
+    """A new curve in its bone's group; the API for naming the group has changed twice."""
     for named in ({"group_name": group}, {"action_group": group}, {}):
         try:
             return curves.new(path, index=index, **named)

@@ -3,19 +3,19 @@
 
 
 def animated(data, without=()) -> set[str]:
-    """Paths that actions, strips and drivers of some animation data write, but for NLA tracks of the names `without`; none
-    where there is no such data.
+    """Paths that actions, strips and drivers of some animation data write, except NLA tracks of the names `without`; none if there
+    is no such data.
     """
     return {curve.data_path for curve in _playing(data, without)}
 
 
 def moved(data) -> set[str]:
-    """Those of them that change: that drivers write, or keys or samples of several values."""
+    """Those paths that change: written by drivers, or by keys or samples with different values."""
     return {curve.data_path for curve in _playing(data) if not _constant(curve)}
 
 
 def strips_of(data, without=()) -> list:
-    """All NLA strips, those within others too, but for those of tracks of the names `without`."""
+    """All NLA strips, also those within others, except those of tracks of the names `without`."""
     strips = [strip for track in data.nla_tracks if track.name not in without for strip in track.strips]
     for strip in strips:  # grows
         strips.extend(getattr(strip, "strips", ()))
@@ -31,7 +31,7 @@ def _playing(data, without=()) -> list:
 
 
 def _constant(curve) -> bool:
-    points = (*curve.keyframe_points, *curve.sampled_points)  # sound is baked to samples
+    points = (*curve.keyframe_points, *curve.sampled_points)  # baked sound is in samples
     return curve.driver is None and not curve.modifiers and len({point.co[1] for point in points}) < 2
 
 

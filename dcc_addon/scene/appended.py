@@ -12,10 +12,11 @@ from .save_as import relative, set_path
 
 
 def remake(items, settings) -> None:
-    """Let settings of appended objects that name a file beside the one they are from name the same file from here.
+    """Rewrite settings of appended objects that name a file relative to their source file, so that they name the same file from
+    here.
 
     Args:
-        items: what Blender tells of an import, since 4.3.
+        items: what Blender reports about an import, since 4.3.
         settings: paths of the settings, from the object.
     """
     here = os.path.dirname(bpy.data.filepath)

@@ -9,7 +9,7 @@ from ..services.rig import RigArrays
 
 def matrix(value) -> np.ndarray:
     """A Blender matrix as (4, 4) float64."""
-    # Row by row: numpy asks a whole one for its shape value by value.
+    # Row by row: numpy would query a whole matrix for its shape value by value.
     return np.array([row[:] for row in value])
 
 
@@ -53,16 +53,16 @@ class PoseReader:
         return self.posed(self._buffer, matrix(evaluated.matrix_world))
 
     def record(self, evaluated, pose: np.ndarray, basis: np.ndarray) -> None:
-        """Fill two arrays (B, 4, 4) float32, one of a block of frames each, for `posed` and `own`: of all frames together
-        these take a fraction of the time.
+        """Fill two arrays (B, 4, 4) float32, this frame's in a block of frames, for `posed` and `own`, which take a fraction of the
+        time for many frames together.
         """
         evaluated.pose.bones.foreach_get("matrix", pose.ravel())
         evaluated.pose.bones.foreach_get("matrix_basis", basis.ravel())
 
     def posed(self, pose: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """(..., J, 4, 4) in Blender's world space, of poses (..., B, 4, 4) of armatures that stand at `place` (..., 4, 4)."""
+        """(..., J, 4, 4) in Blender's world space, from poses (..., B, 4, 4) of armatures that stand at `place` (..., 4, 4)."""
         return place[..., None, :, :] @ pose.astype(float).swapaxes(-1, -2)[..., self._order, :, :]
 
     def own(self, basis: np.ndarray) -> np.ndarray:
-        """What the bones' own channels turn and scale, without constraints, (..., J, 3, 3) in their rest axes."""
+        """Rotation and scale from the bones' own channels, without constraints, (..., J, 3, 3) in their rest axes."""
         return basis.swapaxes(-1, -2)[..., self._order, :3, :3]

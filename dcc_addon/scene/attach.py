@@ -14,11 +14,11 @@ from .save_as import named_here
 
 MODIFIER = "Neuralocks Cache"
 REPLACED = "replaced"
-"""The setting that keeps which modifiers are off because the cache has the surface's motion in it."""
+"""The setting that stores which modifiers are off because the cache contains the surface's motion."""
 
 
 def check_own(thing) -> None:
-    """Refuse an object that belongs to another file: what is changed in it is not saved.
+    """Refuse an object that belongs to another file: changes to it are not saved.
 
     Raises:
         NeuralocksError: it does.
@@ -31,7 +31,7 @@ def check_own(thing) -> None:
 
 
 def check_possible(hair) -> None:
-    """Refuse where Blender was built without USD, and hair of another file."""
+    """Refuse a Blender that was built without USD, and hair of another file."""
     check_own(hair)
     if not getattr(bpy.app.build_options, "usd", True):
         raise NeuralocksError(
@@ -40,7 +40,7 @@ def check_possible(hair) -> None:
 
 
 def has_cache(thing) -> bool:
-    """Whether a cache is on an object; one from the file of an overridden object is taken off by being switched off."""
+    """Whether a cache is on an object; one from the file of an overridden object is removed by switching it off."""
     modifier = thing.modifiers.get(MODIFIER)
     if modifier is None:
         return False
@@ -49,8 +49,8 @@ def has_cache(thing) -> bool:
 
 
 def stretched_since(thing, scene) -> bool:
-    """Whether time is stretched otherwise in this scene than when what an object plays was baked, which then goes on in step
-    with the body, but in the motion that it was baked for, and ends with its frames.
+    """Whether this scene's time stretching has changed since the cache of an object was baked. The cache then stays in step with
+    the body, but plays the motion that it was baked for, and ends with its frames.
     """
     cache = thing.modifiers[MODIFIER].cache_file if has_cache(thing) else None
     if cache is None:
@@ -97,7 +97,7 @@ def attach(hair, path: str, prim: str, scene) -> None:
 
 
 def detach(hair) -> bool:
-    """Take the cache off, and let the hair follow its surface as before; whether there was one."""
+    """Remove the cache, and let the hair follow its surface as before; returns whether there was one."""
     if not has_cache(hair):
         return False
     modifier = hair.modifiers[MODIFIER]
@@ -114,15 +114,15 @@ def detach(hair) -> bool:
 
 
 def _original(thing, modifier):
-    """The modifier that one of an overridden object comes from; None of any other."""
+    """The modifier that a modifier of an overridden object comes from; None for any other."""
     if thing.override_library is None or not modifier.is_override_data:
         return None
     return thing.override_library.reference.modifiers.get(modifier.name)
 
 
 def _follow_time(cache, scene) -> None:
-    """Play the frames that were baked where time is stretched, too: all that is animated, caches as well, is then at
-    another frame than the one shown.
+    """Play the baked frames even if time is stretched: everything animated, including caches, is then at another frame than the one
+    shown.
     """
     cache.driver_remove("frame")
     expression = _in_step(scene)
@@ -132,7 +132,7 @@ def _follow_time(cache, scene) -> None:
 
 
 def _in_step(scene) -> str:
-    """The frame of a bake of this scene at the frame of its animation, as a driver says it; empty where these are one."""
+    """The frame of a bake of this scene at the frame of its animation, as a driver expression; empty if they are the same."""
     stretch = Fraction(scene.render.frame_map_new, scene.render.frame_map_old)
     return "" if stretch == 1 else f"frame * {stretch.numerator} / {stretch.denominator}"
 
@@ -145,7 +145,7 @@ def _cache_file(path: str):
             return cache
     bpy.ops.cachefile.open(filepath=path)
     cache = next(c for c in bpy.data.cache_files if c.name not in known)
-    cache.user_clear()  # the operator counts one that is none, and the block would outlast its modifiers
+    cache.user_clear()  # the operator counts a user that does not exist, and the block would outlast its modifiers
     cache.filepath = named_here(path)
     return cache
 

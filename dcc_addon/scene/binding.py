@@ -20,7 +20,7 @@ def bind_places(context, armature, names, reader, rest: np.ndarray) -> dict[str,
     """World transforms (4, 4) of objects, by full name, as they are when the rig that carries them is in its rest pose
     and the armature object stands where it does now.
 
-    Blender itself is asked, for hair may hang on a bone in many ways: as its child or its child's, by constraints, by
+    Blender itself is asked, because hair may follow a bone in many ways: as a direct or indirect child, by constraints, or by
     another armature that moves this one.
 
     Args:
@@ -40,7 +40,7 @@ def bind_places(context, armature, names, reader, rest: np.ndarray) -> dict[str,
         expected = matrix(evaluated.matrix_world) @ rest
         if not np.allclose(reader.world(evaluated), expected, rtol=1e-3, atol=1e-3 * np.abs(expected).max()):
             raise hidden(armature)
-        # An armature that hangs on a bone of another one has moved too.
+        # An armature attached to a bone of another one has moved too.
         back = here @ np.linalg.inv(world(armature, graph))
         found = {thing.name_full: back @ world(thing, graph) for thing in things}
     _animate(context.scene)
@@ -48,15 +48,13 @@ def bind_places(context, armature, names, reader, rest: np.ndarray) -> dict[str,
 
 
 def _animate(scene) -> None:
-    """Evaluate the animation of the frame once more: before 4.0 an edit takes it off again in view layers that are not in
-    view.
-    """
+    """Evaluate the animation of the frame once more: before 4.0, an edit undoes it in view layers that are not in view."""
     if bpy.app.version < (4, 0):
         scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
 
 
 def hidden(armature) -> NeuralocksError:
-    """What to say of an armature that is not evaluated, or not posed."""
+    """The error for an armature that is not evaluated, or not posed."""
     if armature.mode == "EDIT":
         return NeuralocksError(f"{armature.name_full}: its bones are being edited; leave Edit Mode")
     return NeuralocksError(
@@ -66,7 +64,7 @@ def hidden(armature) -> NeuralocksError:
 
 @contextmanager
 def at_rest(context, *things):
-    """Meanwhile all armatures that these objects depend on, and they themselves, are in their rest poses."""
+    """In this block, all armatures that these objects depend on, and these themselves, are in their rest poses."""
     kept = [(a.data, a.data.pose_position) for a in {a for thing in things for a in armatures_of(thing)}]
     try:
         for data, _ in kept:
@@ -80,7 +78,7 @@ def at_rest(context, *things):
 
 
 def carrier(thing, shown):
-    """The armature that moves an object, or deforms it: the one that is `shown`, unless that does not and another does."""
+    """The armature that moves an object, or deforms it: the one `shown`, unless it does not and another does."""
     moving = armatures_of(thing)
     if not moving or shown in moving:
         return shown
@@ -117,9 +115,7 @@ def _reached(thing, seen: set) -> set:
 
 
 def _targets(constraint) -> list:
-    """What has `target` and `subtarget`: the constraint itself, or the targets of one that has several, the strongest
-    first.
-    """
+    """Whatever has `target` and `subtarget`: the constraint itself, or its targets if it has several, the strongest first."""
     if hasattr(constraint, "targets"):
         return sorted(constraint.targets, key=lambda target: -target.weight)
     return [constraint] if hasattr(constraint, "target") else []

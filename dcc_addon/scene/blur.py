@@ -10,19 +10,19 @@ from .nodes import geometry_nodes
 
 NAME = "Neuralocks Motion Blur"
 TREE = f".{NAME}"
-"""The dot keeps it out of menus: it stays in the session, and is in no file, which holds what has users only."""
+"""The dot keeps it out of menus. It stays in the session, and in no file, because files only hold data with users."""
 
 
 def begin(hair, scene) -> None:
-    """Give hair that is moved a modifier that changes nothing, for the time of a render."""
+    """Give moved hair a modifier that changes nothing, for the duration of a render."""
     if hair.library is None and curves.has_rest(hair.data) and not hair.is_deform_modified(scene, "RENDER"):
         modifier = hair.modifiers.new(NAME, "NODES")
         modifier.node_group = _nothing()
 
 
 def end() -> None:
-    """Take these modifiers off again. Their node group stays: where a scene is rendered into the strip of another, the
-    outer render goes on, and Blender 5.2 crashes when data that it holds is removed.
+    """Remove these modifiers again. Their node group stays: if a scene is rendered into a strip of another, the outer render
+    continues, and Blender 5.2 crashes when data that it uses is removed.
     """
     for thing in bpy.data.objects:
         modifier = thing.modifiers.get(NAME) if thing.type == "CURVES" and thing.library is None else None
@@ -31,7 +31,7 @@ def end() -> None:
 
 
 def _nothing():
-    """Geometry nodes that hand over what they get."""
+    """Geometry nodes that return their input."""
     tree = bpy.data.node_groups.get(TREE)
     if tree is None:
         tree, source, target = geometry_nodes(TREE)

@@ -16,20 +16,20 @@ from .armature import matrix
 from .binding import carrier, carrying_bone
 
 PROBES = 500
-"""Vertices whose weights are compared with what is known."""
+"""Vertices whose weights are compared with the stored ones."""
 WEIGHED = 4000
 """Vertices whose weights are read in one step."""
 
 
 def find(armature, objects) -> list:
-    """The visible meshes that this armature deforms, by name; without those of no faces, such as only modifiers make."""
+    """The visible meshes that this armature deforms, by name; without those whose faces only come from modifiers."""
     meshes = [o for o in objects if o.type == "MESH" and not o.hide_render and len(o.data.polygons)]
     return sorted((o for o in meshes if _deformed(o, armature)), key=lambda o: o.name_full)
 
 
 def read(mesh_object, armature) -> BodyArrays:
-    """Vertices of the basis shape, triangles, weights and shape keys, with what mirror modifiers add; a body that rides
-    on one bone of the armature, as a whole, is weighted to it.
+    """Vertices of the basis shape, triangles, weights and shape keys, with what mirror modifiers add; a body that rides on one bone
+    of the armature as a whole is weighted to it.
 
     Raises:
         NeuralocksError: it has no faces.
@@ -66,7 +66,7 @@ def read(mesh_object, armature) -> BodyArrays:
 
 
 def left_behind(mesh_object, armature) -> str:
-    """What to say of a body that no bone of this armature moves, for it stays with the first one; empty where one does."""
+    """The note on a body that no bone of this armature moves, since it stays with the first bone; empty if one does."""
     if any(_moving(mesh_object, armature)) or carrying_bone(mesh_object, armature) is not None:
         return ""
     moving = carrier(mesh_object, None)
@@ -78,7 +78,7 @@ def left_behind(mesh_object, armature) -> str:
 
 
 def _moving(mesh_object, armature) -> tuple[str, ...]:
-    """Names of the vertex groups, empty for those that no bone moves."""
+    """Names of the vertex groups, with an empty name for those that no bone moves."""
     bones, deformed = armature.data.bones, _deformed(mesh_object, armature)
 
     def moves(name: str) -> bool:  # a group may have the name of a bone that deforms nothing
@@ -94,13 +94,13 @@ def _deformed(mesh_object, armature) -> bool:
 
 
 def _before_armature(mesh_object) -> list:
-    """Modifiers whose result an armature deforms; all, where none does."""
+    """Modifiers whose result an armature deforms; all, if no armature does."""
     types = [modifier.type for modifier in mesh_object.modifiers]
     return list(mesh_object.modifiers)[: types.index("ARMATURE") if "ARMATURE" in types else None]
 
 
 def _mask(block, groups: tuple[str, ...], weights: np.ndarray, count: int):
-    """How much of a shape key each vertex takes, (V, 1); all take all of it where no vertex group limits it."""
+    """How much of a shape key each vertex takes, (V, 1); all take all of it if no vertex group limits it."""
     if block.vertex_group not in groups:
         return 1.0
     mask = np.zeros((count, 1))
@@ -133,14 +133,14 @@ def _weights(mesh, groups: tuple[str, ...]) -> np.ndarray:
 
 
 def weighed(mesh_object) -> Iterator[None]:
-    """Get to know the weights of a body, of a few thousand vertices in each step, if they are not known: Blender gives them
-    one by one, half a second for a large body.
+    """Read the weights of a body if they are not known, a few thousand vertices in each step: Blender gives them one by one, which
+    takes half a second for a large body.
     """
     return _weighed(mesh_object.data, tuple(group.name for group in mesh_object.vertex_groups))
 
 
 def _weighed(mesh, groups: tuple[str, ...]) -> Iterator[None]:
-    """Put the weights of a mesh into the session, step by step; only where a few of them, or the groups, are others than there."""
+    """Put the weights of a mesh into the session, step by step; only if some of them, or the groups, differ from those there."""
     some = range(0, len(mesh.vertices), max(1, len(mesh.vertices) // PROBES))
     probe = len(mesh.vertices), groups, tuple((g.group, g.weight) for v in some for g in mesh.vertices[v].groups)
     name, edits, rows = mesh.name_full, session.edits, []
@@ -149,13 +149,13 @@ def _weighed(mesh, groups: tuple[str, ...]) -> Iterator[None]:
     for first in range(0, len(mesh.vertices), WEIGHED):
         rows += [(v.index, g.group, g.weight) for v in mesh.vertices[first : first + WEIGHED] for g in v.groups]
         yield
-    if edits == session.edits:  # or what was edited in between is read again
+    if edits == session.edits:  # otherwise they were edited in between and are read again
         session.weights[name] = probe, np.array(rows, float).reshape(-1, 3)
 
 
 def shape_values(mesh_object, graph) -> np.ndarray:
-    """Values (B,) of the shape keys as `graph` has them, in the order of `BodyArrays.shapes`; the file's own follow only
-    the view layer that is shown. Absolute keys are blended by the two that are next in time, as with linear interpolation.
+    """Values (B,) of the shape keys as `graph` has them, in the order of `BodyArrays.shapes`; those in the file follow only the
+    view layer that is shown. Absolute keys are blended from the two nearest in time, as with linear interpolation.
     """
     keys = mesh_object.data.shape_keys
     if not keys or len(keys.key_blocks) < 2:

@@ -14,14 +14,14 @@ from .lookup import find
 from .watched import evaluated_for_itself
 
 FAR = 0.005
-"""Less is not told [m]."""
+"""Smaller distances are not reported [m]."""
 REACH = 0.5
-"""How far from the head's joint it matters [m]."""
+"""How far from the head's joint a distance matters [m]."""
 
 
 def drawn(mesh_object, graph) -> np.ndarray | None:
-    """World points (V, 3) of a mesh as it is drawn, in Blender's space; None where these are not its own vertices, because a
-    modifier makes others, or where Blender does not evaluate it, or without its armature.
+    """World points (V, 3) of a mesh as it is drawn, in Blender's space. None if they are not its own vertices, because a modifier
+    makes others, or if Blender does not evaluate it, or does so without its armature.
     """
     off = any(modifier.type == "ARMATURE" and not modifier.show_viewport for modifier in mesh_object.modifiers)
     if off or not evaluated_for_itself(mesh_object, graph):
@@ -33,11 +33,11 @@ def drawn(mesh_object, graph) -> np.ndarray | None:
 
 
 def all_told(armature, bodies: list, seen: dict, character, clip, unit: float) -> tuple[str, ...]:
-    """What to say of the bodies of an armature that are drawn elsewhere than is expected.
+    """Notes on the bodies of an armature that are drawn elsewhere than expected.
 
     Args:
         bodies: their `BodyArrays`, together the body of the character.
-        seen: what `drawn` gave of each of them, by row of the clip.
+        seen: what `drawn` returned for each of them, by row of the clip.
         character, clip: how hair knows them, in the core's space.
         unit: metres of Blender's unit.
     """

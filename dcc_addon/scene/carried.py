@@ -11,7 +11,7 @@ def hairs_of(armature, scene) -> list:
 
 
 def bodies_of(armature, scene) -> list:
-    """The body mesh chosen by the artist, else all that the armature deforms."""
+    """The body mesh chosen by the artist, otherwise all meshes that the armature deforms."""
     chosen = armature.neuralocks_character.body
     if chosen is not None and chosen.type == "MESH" and in_scene(chosen, scene):
         return [chosen]

@@ -18,10 +18,10 @@ from .nodes import geometry_nodes
 
 REST = rest_copy.NAME
 TYPES = ("CATMULL_ROM", "POLY", "BEZIER", "NURBS")
-"""By the number that Blender keeps in the attribute `curve_type`."""
+"""Indexed by the number in Blender's attribute `curve_type`."""
 KEEPS_CACHES = bpy.app.version < (5, 2) and "add_curves" in bpy.types.Curves.bl_rna.functions
-"""Whether Blender keeps the bounds and the smooth curves of the old points until strands are added, be it none: geometry
-nodes that resample or mesh the hair would use the old ones.
+"""Whether Blender keeps the bounds and the smooth curves of the old points until strands are added, even zero: geometry nodes that
+resample or mesh the hair would use the old ones.
 """
 RADIUS = 0.005
 """Radius of hair without the attribute `radius`, as Cycles draws it, in the object's space."""
@@ -40,7 +40,7 @@ def points(data) -> np.ndarray:
 
 
 def shown(data, out: np.ndarray | None = None) -> np.ndarray:
-    """Points as they are, (P, 3) float32; in `out`, if that is given and they have positions, as all curves do but empty ones."""
+    """Points as they are, (P, 3) float32; in `out`, if that is given and there are positions, as in all but empty curves."""
     return _read(data, "position", out)
 
 
@@ -55,7 +55,7 @@ def radius(data) -> np.ndarray | None:
 
 
 def kind(data) -> str:
-    """What the strands are, one of TYPES; POLY where they are of several types.
+    """The strands' type, one of TYPES; POLY if they have several types.
 
     Raises:
         NeuralocksError: some are Bezier curves.
@@ -75,29 +75,29 @@ def kind(data) -> str:
 
 
 def check(hair) -> None:
-    """Refuse a hair object that cannot be moved, before anything long is done with it.
+    """Refuse a hair object that cannot be moved, before any long work on it.
 
     Raises:
-        NeuralocksError: it has no strands, or strands that no network moves.
+        NeuralocksError: it has no strands, or strands that no network can move.
     """
     check_strands(hair.name_full, points(hair.data), counts(hair.data))
     kind(hair.data)
 
 
 def has_rest(data) -> bool:
-    """Whether the rest shape is kept aside because the points are moved."""
+    """Whether the rest shape is stored because the points are moved."""
     attribute = data.attributes.get(REST)
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
-        return False  # also where it was converted by hand
+        return False  # also if it was converted by hand
     return len(attribute.data) == len(data.points)
 
 
 def keep_rest(data, whole: bool = False) -> None:
-    """Put the points aside as rest shape, unless they already are; `whole` says that each point has one then: to look
-    takes as long as a fifth of the rest of a live frame.
+    """Store the points as rest shape, unless they already are. `whole` says that each point then has one: checking takes a fifth of
+    the time of the rest of a live frame.
 
     Raises:
-        NeuralocksError: the data belongs to another file, or to several objects, or cannot be moved by its points.
+        NeuralocksError: the data belongs to another file, or to several objects, or cannot be moved by moving its points.
     """
     if data.library is not None or data.override_library is not None:
         moved = (
@@ -115,7 +115,7 @@ def keep_rest(data, whole: bool = False) -> None:
             "Relations > Make Single User > Object & Data)"
         )
     if has_rest(data):
-        # Strands that were joined are about to be moved, too.
+        # Joined strands are about to be moved, too.
         if not whole and rest_copy.never_written(_read(data, REST)).any():
             _keep(data, _rest(data))
         return
@@ -124,7 +124,7 @@ def keep_rest(data, whole: bool = False) -> None:
 
 
 def put_aside(data, values: np.ndarray) -> None:
-    """Keep (P, 3) float32 as rest shape where none is kept."""
+    """Store (P, 3) float32 as rest shape if none is stored."""
     stale = data.attributes.get(REST)
     if stale is not None:  # the strands were edited since: the old rest shape fits them no longer
         data.attributes.remove(stale)
@@ -133,14 +133,14 @@ def put_aside(data, values: np.ndarray) -> None:
 
 
 def move_rest(data, matrix: np.ndarray, part: slice = slice(None)) -> None:
-    """Move the rest shape that is kept aside, or that of some of the points, by a transform (4, 4)."""
+    """Move the stored rest shape, or that of some of the points, by a transform (4, 4)."""
     values = _rest(data)
     values[part] = transformed(values[part], matrix)
     _keep(data, values)
 
 
 def restore_rest(data) -> bool:
-    """Put the points back to rest and forget the copy, and let them follow their surface as before; whether there was one."""
+    """Put the points back to rest, forget the copy, and let them follow their surface as before; returns whether there was one."""
     unbound.bind(data, "muted")
     if not has_rest(data):
         return False
@@ -181,14 +181,14 @@ def create(name: str, strands: np.ndarray, points_of: np.ndarray, radii: np.ndar
 
 
 def _make_poly(data) -> None:
-    """Straight segments: Catmull-Rom, the default, is evaluated at twelve times the points by Blender 5.2, in vain for
+    """Straight segments: Catmull-Rom, the default, is evaluated at twelve times the points by Blender 5.2, without benefit for
     24-point strands.
     """
     if hasattr(data, "set_types"):
         data.set_types(type="POLY")
         return
-    # Blender 4.2 keeps count of the types and is not told when the attribute `curve_type` is written: it then writes
-    # beyond its arrays. One evaluated point a segment draws the same.
+    # Blender 4.2 keeps count of the types and is not told when the attribute `curve_type` is written: it then writes beyond its
+    # arrays. One evaluated point per segment draws the same.
     data.attributes.new("resolution", "INT", "CURVE").data.foreach_set("value", np.ones(len(data.curves), np.int32))
 
 
@@ -230,8 +230,8 @@ def _read(data, name: str, out: np.ndarray | None = None) -> np.ndarray:
 
 
 def _rest(data) -> np.ndarray:
-    """The rest shape that is kept aside. Strands that were joined to live hair, or it to them, have none yet, zeros that
-    is: they are at rest as they are.
+    """The stored rest shape. Strands joined to live hair, or to which it was joined, have none yet, that is, zeros: they are at
+    rest as they are.
     """
     values = _read(data, REST)
     bare = rest_copy.never_written(values)
@@ -248,6 +248,6 @@ def _keep(data, values: np.ndarray) -> None:
 
 
 def _unmarked(values: np.ndarray) -> np.ndarray:
-    """The same array, where points at the origin begin with a plain zero."""
+    """The same array, with a plain zero again for points at the origin."""
     values[~values.any(axis=1), 0] = 0.0
     return values

@@ -13,7 +13,7 @@ from . import curves
 from .carried import bodies_of
 
 BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
-"""What strands of a type are in USD, where they are more than straight lines."""
+"""The USD basis of each strand type that is not straight lines."""
 
 
 def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=()) -> dict[str, str]:
@@ -23,7 +23,7 @@ def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=()) -> dict[
         path: the USD file.
         armature, scene: what to write.
         sampled: its `SampledRig`.
-        hairs: hair objects to write, which it carries.
+        hairs: hair objects to write, carried by the armature.
         undrawn: names of those that are invisible in the file.
 
     Returns:

@@ -9,10 +9,10 @@ from .lively import Lively, lively
 
 
 def guests(scene, own: Lively | None = None) -> list[tuple]:
-    """Live hair objects and armatures of other scenes that this one draws, each with a scene that it is in.
+    """Live hair objects and armatures of other scenes that this scene draws, each with a scene that it is in.
 
     Args:
-        own: what is lively of the scene's own, where the caller knows it.
+        own: what is lively in the scene itself, if the caller knows it.
     """
     if len(bpy.data.scenes) < 2:
         return []
@@ -48,8 +48,8 @@ def _behind(scene) -> list:
 
 
 def _home(thing, guest_of):
-    """Another scene that an object is in, None where there is none. Its collections are asked, which is a tenth of the time
-    that looking through its objects takes.
+    """Another scene that an object is in, None if there is none. It is found through collections, in a tenth of the time that
+    looking through objects takes.
     """
     for scene in bpy.data.scenes:
         if scene != guest_of:

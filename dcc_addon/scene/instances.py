@@ -5,7 +5,7 @@ from neuralocks_core.errors import NeuralocksError
 
 
 def check_real(things) -> None:
-    """Refuse an object that shows a character in this way.
+    """Refuse an object that shows a character as an instance.
 
     Raises:
         NeuralocksError: one of these objects does.

@@ -7,8 +7,8 @@ import bpy
 
 
 def go_last(handler) -> None:
-    """Let this one of those that are called after a frame change be the last; not while they are being called, or one of
-    them goes without.
+    """Make this handler the last of those called after a frame change; not while they are being called, or one of them would be
+    skipped.
     """
     calls = bpy.app.handlers.frame_change_post
     if handler in calls and calls[-1] != handler:
@@ -17,5 +17,5 @@ def go_last(handler) -> None:
 
 
 def others_called() -> bool:
-    """Whether anybody else is called after a frame change."""
+    """Whether any other handler is called after a frame change."""
     return len(bpy.app.handlers.frame_change_post) > 1

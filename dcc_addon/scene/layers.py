@@ -13,8 +13,8 @@ from .shown import enabled
 
 
 def layer_of(armature, scene):
-    """The view layer in which to look at an armature: the one in view, if it moves there, else one that Blender has
-    evaluated before others; None where it moves in none.
+    """The view layer in which to look at an armature: the one in view, if it moves there, otherwise preferably one that Blender has
+    evaluated; None if it moves in none.
     """
     seen = bpy.context.view_layer if bpy.context.scene == scene else None
     if seen is not None and _moves(armature, scene, seen, "VIEWPORT"):
@@ -24,7 +24,7 @@ def layer_of(armature, scene):
 
 
 def elsewhere(armature, scene, graph) -> bool:
-    """Whether an armature moves in other view layers, and not in the one that `graph` is of."""
+    """Whether an armature moves in other view layers, but not in that of `graph`."""
     if armature is None or len(scene.view_layers) < 2 or _moves(armature, scene, graph.view_layer, graph.mode):
         return False
     return any(_moves(armature, scene, layer, graph.mode) for layer in scene.view_layers)
@@ -32,7 +32,7 @@ def elsewhere(armature, scene, graph) -> bool:
 
 @contextmanager
 def working_in(scene, layer):
-    """Meanwhile Blender works on this view layer; scripts render scenes that are not in view, with several of them."""
+    """In this block, Blender works on this view layer; scripts render scenes that are not in view and have several."""
     if scene == bpy.context.scene and layer == bpy.context.view_layer:
         yield
     else:
@@ -47,8 +47,8 @@ def graph_of(scene, layer):
 
 
 def _moves(armature, scene, layer, mode: str) -> bool:
-    """Whether a view layer shows an armature or something that it moves; `mode` as of a depsgraph, "VIEWPORT" or "RENDER",
-    for things may be disabled in either.
+    """Whether a view layer shows an armature or something that it moves; `mode` as of a depsgraph, "VIEWPORT" or "RENDER", since
+    things may be disabled in either.
     """
     if enabled(armature, layer, mode):
         return True

@@ -7,7 +7,7 @@ _KINDS = frozenset(("CURVES", "ARMATURE", "EMPTY"))
 
 
 class Lively(NamedTuple):
-    """Hair objects that are live, armatures whose hair bones are, and collections of which some of the objects are instances."""
+    """Hair objects that are live, armatures whose hair bones are, and collections that some of the objects instance."""
 
     hairs: list
     armatures: list
@@ -15,7 +15,7 @@ class Lively(NamedTuple):
 
 
 def lively(things) -> Lively:
-    """Those of some objects."""
+    """What is lively among some objects."""
     found = Lively([], [], [])
     for thing in [thing for thing in things if thing.type in _KINDS]:
         if thing.type == "CURVES":

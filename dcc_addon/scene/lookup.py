@@ -21,23 +21,23 @@ def in_scene(thing, scene) -> bool:
 
 
 def identity(thing):
-    """What tells a data block from all others that this Blender has had, also from a later one of its name; oldest
-    Blenders number none, and there an undo may change it.
+    """Distinguishes a data block from all others of this Blender session, also from a later one of its name. The oldest Blenders do
+    not number data blocks, and there an undo may change it.
     """
     number = getattr(thing, "session_uid", None)
     return (bpy.data.filepath, thing.as_pointer()) if number is None else number
 
 
 def identified(number):
-    """The object of this identity, whatever it is called by now, or None."""
+    """The object with this identity, whatever its name is now, or None."""
     return next((o for o in bpy.data.objects if identity(o) == number), None)
 
 
 def named(name_full: str):
-    """The object of this full name, which longer work began with.
+    """The object of this full name, for longer work that began with it.
 
     Raises:
-        NeuralocksError: there is none any more.
+        NeuralocksError: it no longer exists.
     """
     thing = find(name_full)
     if thing is None:

@@ -12,23 +12,23 @@ from .remembered import remembered
 SIMULATION, DEFORM = "GeometryNodeXPBDSolver", "GeometryNodeDeformCurvesOnSurface"
 """Nodes at the heart of the modifiers that Blender puts on new hair: since 5.2 Hair Dynamics, before that Surface Deform."""
 PLAIN = {DEFORM, "NodeGroupInput", "NodeGroupOutput", "NodeReroute", "NodeFrame"}
-"""Nodes of a tree that does nothing else than let hair follow its surface."""
+"""Nodes of a tree that only lets hair follow its surface."""
 RESTING = {"Surface Rest Position", "Resting Surface"}
-"""Inputs of Blender's hair assets that let them work on the surface at rest, for what deforms it comes later in the stack:
-as they are called up to 5.1, and since.
+"""Inputs of Blender's hair assets that make them use the surface at rest, because what deforms it comes later in the stack: their
+names up to 5.1, and since.
 """
 
 
 def mute_deformers(hair, kept: str = "muted") -> None:
-    """Switch off, and remember in the setting `kept`, what makes the hair follow the surface or simulates it, and what takes
-    the surface as it is at rest: the live view, or a cache, gives hair that is posed already.
+    """Switch off, and remember in the setting `kept`, what makes the hair follow the surface, simulates it, or uses the surface at
+    rest: hair from the live view or a cache is already posed.
     """
     settings = hair.neuralocks_hair
     text = getattr(settings, kept)
     found, deforms = remembered(text, _fits), False
     for modifier in hair.modifiers:
         shown, before = modifier.show_viewport or modifier.show_render, found.get(modifier.name, ())
-        hidden = any(isinstance(value, bool) for value in before)  # else its inputs are remembered, if anything is
+        hidden = any(isinstance(value, bool) for value in before)  # otherwise its inputs are remembered, if anything is
         if _moves(modifier, hair):
             if shown:
                 if not hidden:
@@ -48,9 +48,9 @@ def mute_deformers(hair, kept: str = "muted") -> None:
 def unmute_deformers(hair, kept: str = "muted") -> None:
     """Switch them on again as they were."""
     settings = hair.neuralocks_hair
-    if hair.type == "CURVES":  # else it was converted
+    if hair.type == "CURVES":  # otherwise it was converted
         unbound.bind(hair.data, kept)
-    if not getattr(settings, kept):  # to write it would be an update of the hair, which may call here again
+    if not getattr(settings, kept):  # writing it would be an update of the hair, which may call this again
         return
     found = remembered(getattr(settings, kept), _fits)
     off, resting = iter(_renamed(hair, found)), iter(_renamed_resting(hair, found))
@@ -76,19 +76,19 @@ def off_meanwhile(hair) -> list[str]:
 
 
 def on_top(hair) -> list[str]:
-    """Names of the modifiers that do more than to move the hair, and are not switched off: a cache plays below them."""
+    """Names of the modifiers that do more than move the hair, and are not switched off: a cache plays below them."""
     return [m.name for m in hair.modifiers if (m.show_viewport or m.show_render) and not _only_moves(m)]
 
 
 def _fits(values: list) -> bool:
-    """Whether this was remembered of a modifier: where it was shown, or which of its inputs were on."""
+    """Whether these values can be a modifier's: where it was shown, or which of its inputs were on."""
     shown = len(values) == 2 and all(isinstance(value, bool) for value in values)
     return shown or (bool(values) and all(isinstance(value, str) for value in values))
 
 
 def _before(hair, modifier, found: dict) -> list[bool]:
-    """How to show a modifier again that is not among those remembered: as it is shown now; or, where it is one of those,
-    was renamed and then switched on by hand in one place, as that one.
+    """How to show a modifier that is not among those remembered: as it is shown now; or, if it is one of them that was renamed and
+    then switched on by hand in one place, as that one was.
     """
     gone = [name for name, before in found.items() if name not in hair.modifiers and isinstance(before[0], bool)]
     if modifier.show_viewport != modifier.show_render and len(gone) > len(_renamed(hair, found)):
@@ -132,7 +132,7 @@ def _tree(modifier):
 
 
 def _resting(modifier) -> list[str]:
-    """Identifiers of the inputs that let a modifier work on the surface at rest."""
+    """Identifiers of the inputs that make a modifier use the surface at rest."""
     return [identifier for name, identifier in inputs_of(_tree(modifier)) if name in RESTING]
 
 

@@ -17,7 +17,7 @@ def geometry_nodes(name: str) -> tuple:
 
 
 def inputs_of(tree) -> list[tuple[str, str]]:
-    """Names and identifiers of what a modifier can give a tree; none where there is no tree."""
+    """Names and identifiers of what a modifier can give a tree; none if there is no tree."""
     if tree is None:
         return []
     if hasattr(tree, "interface"):
@@ -29,14 +29,14 @@ def inputs_of(tree) -> list[tuple[str, str]]:
 
 
 def read_input(modifier, identifier: str):
-    """What a modifier gives its tree; None where it keeps nothing of this name."""
+    """What a modifier gives its tree; None if it has nothing of this name."""
     if hasattr(modifier, "properties"):  # since 5.2
         return getattr(getattr(modifier.properties.inputs, identifier, None), "value", None)
     return modifier.get(identifier)
 
 
 def write_input(modifier, identifier: str, value) -> None:
-    """Give its tree another value, where the modifier keeps one of this name. The caller tags the object."""
+    """Give its tree another value, if the modifier has one of this name. The caller tags the object."""
     if hasattr(modifier, "properties"):
         if read_input(modifier, identifier) is not None:
             getattr(modifier.properties.inputs, identifier).value = value

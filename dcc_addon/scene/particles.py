@@ -17,12 +17,12 @@ from .armature import matrix
 from .binding import at_rest
 
 CHILD_STEPS = 4
-"""Two to this power are the segments that a child gets at least."""
+"""A child gets at least two to this power segments."""
 
 
 def choose(context, name: str = "") -> tuple:
-    """The object and its particle system to convert: of this name, else hair that is not converted yet, of the active
-    object before all others and its active system before its others.
+    """The object and its particle system to convert: of this name, otherwise hair that is not converted yet, first of the active
+    object, and there first the active system.
 
     Raises:
         NeuralocksError: there is none.
@@ -50,9 +50,8 @@ def waiting(thing) -> list:
 
 
 def convert(context, source, system, children: bool = True):
-    """A new hair Curves object with the keys of the particle hair of `source`, and its children as they are rendered,
-    parented to it, as they are where the rig is at rest and shape keys that move are off, of the same material and as
-    thick.
+    """A new hair Curves object, parented to `source`, with the keys of its particle hair and its children as rendered, where they
+    are with the rig at rest and moving shape keys off, of the same material and thickness.
 
     Blender's own conversion gives the points that are drawn (9 by default), not the keys that were groomed.
 
@@ -68,7 +67,7 @@ def convert(context, source, system, children: bool = True):
         at_rest(context, source),
         _shape_at_rest(source),
         _changed(shown, show_viewport=True),
-        _changed(system, use_hair_dynamics=False),  # a simulation of its own is no groom
+        _changed(system, use_hair_dynamics=False),  # a simulated shape is not a groom
         _changed(settings, **_rendered(settings, children)),
         _changed(render, simplify_child_particles=render.simplify_child_particles_render),
     ):
@@ -99,13 +98,13 @@ def _radii(settings, counts: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def _material(source, settings):
-    """The material of the emitter's slot that the hair names, the last one where there are fewer."""
+    """The material of the emitter's slot that the hair names; the last one if there are fewer slots."""
     slots = source.material_slots
     return slots[min(settings.material, len(slots)) - 1].material if slots else None
 
 
 def _rendered(settings, children: bool) -> dict[str, int]:
-    """Settings with which the viewport has all hair that a render has, with its children if these are wanted."""
+    """Settings that make the viewport have all hair that a render has, with children if wanted."""
     if not children:
         return {"display_percentage": 100}
     number = "child_percent" if hasattr(settings, "child_percent") else "child_nbr"
@@ -118,7 +117,7 @@ def _rendered(settings, children: bool) -> dict[str, int]:
 
 @contextmanager
 def _changed(thing, **values):
-    """Meanwhile a thing has these values."""
+    """In this block, a thing has these values."""
     kept = {name: getattr(thing, name) for name in values}
     try:
         for name, value in values.items():
@@ -131,8 +130,8 @@ def _changed(thing, **values):
 
 @contextmanager
 def _shape_at_rest(thing):
-    """Meanwhile the shape keys that keys or drivers move are off, whatever they are in this frame; those that are always on
-    belong to the shape.
+    """In this block, shape keys that keyframes or drivers move are off, whatever their value in this frame; those that are always
+    on belong to the shape.
     """
     shapes = getattr(thing.data, "shape_keys", None)
     moving = moved(shapes.animation_data) if shapes else ()

@@ -7,7 +7,7 @@ from neuralocks_core.errors import NeuralocksError
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set()
 FILE = {"subtype": "FILE_PATH", "options": _RELATIVE}
-"""How such a property is made; since 4.5 Blender warns of // where it is not told that we know what it means."""
+"""Arguments for such a property; since 4.5, Blender warns about // unless the property says that it supports it."""
 
 
 def absolute(path: str, library=None) -> str:
@@ -24,15 +24,15 @@ def absolute(path: str, library=None) -> str:
 
 
 def full(path: str, library=None) -> str:
-    """The same, unchecked. What Windows wrote after the // may part folders by backslashes, which are letters elsewhere."""
+    """The same, unchecked. A path written on Windows may separate folders by backslashes after the //, which are letters elsewhere."""
     if path.startswith("//"):
         path = path.replace("\\", "/")
     return bpy.path.abspath(path, library=library)
 
 
 def library_of(thing, setting: str):
-    """The library in whose file a setting of an object was made; None for this file. A library override has the value of
-    what it overrides until it is given another.
+    """The library in whose file a setting of an object was made; None for this file. A library override has the value of what it
+    overrides until it gets another.
     """
     while (override := thing.override_library) is not None and override.reference is not None:
         if override.reference.path_resolve(setting) != thing.path_resolve(setting):

@@ -8,8 +8,8 @@ from .watched import evaluated_for_itself
 
 
 def world(thing, graph) -> np.ndarray:
-    """World transform (4, 4) of an object as `graph` has it. What is hidden or excluded Blender may leave where it was in
-    another frame, without telling: its place then comes from its parent's, where nothing else moves it.
+    """World transform (4, 4) of an object as `graph` has it. Blender may leave hidden or excluded objects where they were in
+    another frame, without telling: their place then comes from their parent's, if nothing else moves them.
     """
     evaluated, plain = thing.evaluated_get(graph), not len(thing.constraints) and thing.animation_data is None
     if evaluated.is_evaluated and (evaluated_for_itself(thing, graph) or not plain):

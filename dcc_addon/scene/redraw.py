@@ -5,7 +5,7 @@ import bpy
 
 
 def redraw() -> None:
-    """Draw every 3D viewport again, its sidebar too, and the preferences, which say what training lacks."""
+    """Redraw every 3D viewport with its sidebar, and the preferences, which say what training lacks."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in ("VIEW_3D", "PREFERENCES"):

@@ -5,7 +5,7 @@ import bpy
 
 
 def found_anew() -> None:
-    """Let Blender look at that anew with the next update. Where nothing of a rig but muted tracks was animated when it looked
-    last, for a render say, 4.5 to 5.2 go on in the view without them after they are unmuted, and so does whoever steps frames.
+    """Make Blender find the dependencies again with the next update. If a rig only had muted tracks when Blender last looked, for
+    example for a render, 4.5 to 5.2 leave them out of the view after they are unmuted, and also when frames are stepped.
     """
-    bpy.data.objects.remove(bpy.data.objects.new("Neuralocks Probe", None))  # any object that comes or goes does it
+    bpy.data.objects.remove(bpy.data.objects.new("Neuralocks Probe", None))  # adding or removing any object does it

@@ -9,17 +9,17 @@ LARGEST = 1e15
 
 
 def remembered(text: str, fits: Callable[[list], bool]) -> dict[str, list]:
-    """Values by name, those that fit; none where the text holds something else."""
+    """Values by name, those that fit; none if the text holds something else."""
     try:
         found = json.loads(text or "{}")
-    except (ValueError, TypeError, RecursionError):  # it may be no text at all, or a number too long to read
+    except (ValueError, TypeError, RecursionError):  # it may not be text at all, or hold a number too long to read
         return {}
     pairs = found.items() if isinstance(found, dict) else ()
     return {name: values for name, values in pairs if isinstance(values, list) and _is_name(name) and fits(values)}
 
 
 def are_numbers(values, count: int) -> bool:
-    """Whether these are so many numbers that Blender can hold."""
+    """Whether these are `count` numbers that Blender can hold."""
     return isinstance(values, Sequence) and len(values) == count and all(map(_is_number, values))
 
 
@@ -29,4 +29,4 @@ def _is_name(text: str) -> bool:
 
 
 def _is_number(value) -> bool:
-    return type(value) in (int, float) and -LARGEST < value < LARGEST  # neither of which holds of NaN
+    return type(value) in (int, float) and -LARGEST < value < LARGEST  # both are false for NaN

@@ -12,9 +12,9 @@ from ..services import rig as rig_service
 from . import curves
 
 FAR = 0.01
-"""Less is not told [m]."""
+"""Smaller distances are not reported [m]."""
 PROBES = 1000
-"""Points of hair, about, whose mean stands for all of it."""
+"""About how many points' mean stands for a whole hair object."""
 
 
 def carriers(
@@ -24,7 +24,7 @@ def carriers(
 
     Args:
         rig: the armature.
-        head, heads: its joint that carries hair, and world transforms (T, 4, 4) of that.
+        head, heads: its joint that carries hair, and the joint's world transforms (T, 4, 4).
         moved: gives those of a joint, as Blender has them.
         places: those of the hair objects, by name.
     """
@@ -32,7 +32,7 @@ def carriers(
     for joint, parent in enumerate(rig.parents):  # parents come first
         below[joint] = parent == head or parent >= 0 and below[parent]
     named = rig.named_head()
-    if named is not None:  # which is no part of a neck that the artist calls the head
+    if named is not None:  # if the artist calls the neck the head, the head is not a part of it
         below[named] = False
     able = np.flatnonzero(below)
     found = {name: following.carrier_below(place, heads, able, moved) for name, place in places.items()}
@@ -47,7 +47,7 @@ def strays_told(
     places: dict,
     metres: float,
 ) -> dict[str, str]:
-    """What to say of hair objects that do not go with the head, by name.
+    """Notes on hair objects that do not move with the head, by name.
 
     Args:
         hairs: those that ride on no joint below it.
@@ -56,7 +56,7 @@ def strays_told(
         metres: of Blender's unit.
     """
     joint, ways = rig.humanoid().get("hips", 0), [np.broadcast_to(np.eye(4), heads.shape), places[""], heads]
-    while joint >= 0:  # what carries the whole body is as good as its object
+    while joint >= 0:  # what carries the whole body counts like its object
         ways.append(moved(joint))
         joint = rig.parents[joint]
     said = {hair.name_full: _told(hair, places[hair.name_full], ways, metres) for hair in hairs}
@@ -64,7 +64,9 @@ def strays_told(
 
 
 def _told(hair, places: np.ndarray, ways: list[np.ndarray], metres: float) -> str:
-    """What to say of a hair object at `places`, empty where it goes with one of what hair may hang on, the head's `ways`."""
+    """The note on a hair object at `places`, empty if it moves with one of the things that hair may be attached to, the head's
+    `ways`.
+    """
     points, shown = curves.points(hair.data), np.abs(np.linalg.det(places)) > 0
     if not len(points) or not shown.any() or hair.parent_type.startswith("VERTEX"):  # skin is followed strand by strand
         return ""

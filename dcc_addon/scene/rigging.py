@@ -27,28 +27,28 @@ CURVE = (
     "eval_time",
 )
 POINT = ("co", "handle_left", "handle_right", "tilt", "radius")
-"""What moves along a curve of this shape reads of it."""
+"""What an object that moves along a curve reads from its points."""
 DELTA = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
 """What adds to an object's own channels, PLACE."""
 NOT_SET = {"name", "active", "select", "show_expanded", "strip_time", "influence"}
-"""What only tells how something is shown; and, of strips, what Blender itself writes."""
+"""Settings that only affect how something is shown, and those of strips that Blender itself writes."""
 _written: dict[type, list[str]] = {}
 
 
 def rigging(things) -> int:
-    """A number that changes when one of these objects, or one that it depends on, is put together otherwise."""
+    """A number that changes when the setup of one of these objects, or of one that it depends on, changes."""
     return zlib.crc32(repr([_object(thing) for thing in _reached(things)]).encode())
 
 
 def posture(things) -> int:
-    """A number that changes when one of these objects, or one that it depends on, is placed or posed otherwise by values
-    that no animation writes: those count in all frames. Hair bones count as they are without the hair's motion.
+    """A number that changes when one of these objects, or one that it depends on, is placed or posed differently by values that no
+    animation writes: these count in all frames. Hair bones count as they are without the hair's motion.
     """
     return zlib.crc32(repr([_held(thing) for thing in _reached(things)]).encode())
 
 
 def _reached(things) -> list:
-    """Objects on whose place or pose these depend, and they themselves."""
+    """These objects, and those on whose place or pose they depend."""
     found = {thing.name_full: thing for thing in things}
     waiting = list(found.values())
     while waiting:
@@ -120,14 +120,14 @@ def _held(thing) -> list:
 
 
 def _mode(owner, start: str, moving: set[str], live=()) -> str:
-    """How an object or a bone turns; as in `live`, where it is there."""
+    """The rotation mode of an object or a bone; as in `live`, if it is there."""
     if f"{start}rotation_mode" in moving:
         return ""
     return live["rotation_mode"] if "rotation_mode" in live else owner.rotation_mode
 
 
 def _shape(curve) -> list:
-    """The shape of a curve, but for what animation writes of it."""
+    """The shape of a curve, except what animation writes."""
     moving = animated(curve.animation_data)
     found = _values(curve, [name for name in CURVE if name not in moving])
     if not any(path.startswith("splines") for path in moving):
@@ -143,7 +143,7 @@ def _of(point) -> list:
 
 
 def _lists(owner) -> list:
-    """Lists of numbers among the custom properties; single ones are among what `rigging` tells."""
+    """Lists of numbers among the custom properties; `rigging` covers single ones."""
     return [(key, value.to_list()) for key, value in owner.items() if hasattr(value, "to_list")]
 
 
@@ -167,7 +167,7 @@ def _channels(bones, names: dict[str, int]) -> list[int]:
 
 
 def _numbers(owner, start: str, moving: set[str]) -> list:
-    """Numbers among the custom properties that no animation writes: switches between IK and FK, say."""
+    """Numbers among the custom properties that no animation writes, such as switches between IK and FK."""
     return [
         (key, value)
         for key, value in owner.items()

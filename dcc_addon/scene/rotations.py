@@ -13,22 +13,22 @@ from .animated import animated
 from .remembered import are_numbers, remembered
 
 SAME = 1e-7
-"""Values that differ by less are the same turn."""
+"""Values that differ by less than this are the same turn."""
 SAME_PLACE = 1e-5
-"""Places that differ by less, in the armature's unit, are the same."""
+"""Places that differ by less than this, in the armature's unit, are the same."""
 CHANNELS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle", "XYZ": "rotation_euler"}
 """Rotation mode -> the property in which a bone keeps its rotation."""
 MODES = ("QUATERNION", "AXIS_ANGLE", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 """All rotation modes of Blender."""
 KEPT = ("rotation_mode", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
-"""What is put aside of a bone."""
+"""What is stored of a bone."""
 KEYED = ("QUATERNION", "XYZ", "AXIS_ANGLE")
-"""Modes for keys, best first: the axis of a small turn is anywhere, so between two keys it swings."""
+"""Modes for keys, best first: the axis of a small turn is arbitrary, so it swings between two keys."""
 
 
 def kept(armature, bones) -> str:
-    """Rotation modes, and the values of every mode, of the bones named that are there, as JSON: KEPT of each, where it is at
-    rest, by which it is known under another name, and the modes that animation writes.
+    """Rotation modes, and the values of every mode, of the named bones that exist, as JSON: KEPT of each, its place at rest, which
+    identifies it under another name, and the modes that animation writes.
     """
     found, written = {}, animated(armature.animation_data)
     for name in bones:
@@ -41,13 +41,13 @@ def kept(armature, bones) -> str:
 
 
 def kept_in(text: str) -> dict[str, list]:
-    """What `kept` put aside, by bone; without what it never wrote."""
+    """What `kept` stored, by bone; without values that it never writes."""
     return remembered(text, _fits)
 
 
 def give_back(armature, text: str, keyed: bool = False) -> None:
-    """Turn bones as `kept` found them, those that are still there. With `keyed` those that animation has come to turn since,
-    as Blender's Bake Action does, are left to that.
+    """Turn the bones that are still there as `kept` found them. With `keyed`, bones that animation has since begun to turn, as
+    Blender's Bake Action does, are left to it.
     """
     found, written = kept_in(text), animated(armature.animation_data) if keyed else set()
     for name, (mode, quaternion, euler, axis_angle, *more) in found.items():
@@ -55,14 +55,14 @@ def give_back(armature, text: str, keyed: bool = False) -> None:
         if bone is not None and (since := _written_since(bone, mode, more, written)):
             bone.rotation_mode = since
         elif bone is not None:
-            bone.rotation_mode = mode  # first, as it writes the values of its mode from those of the last one
+            bone.rotation_mode = mode  # first, because it converts the values from the previous mode
             bone.rotation_quaternion, bone.rotation_euler, bone.rotation_axis_angle = quaternion, euler, axis_angle
     if found:
         armature.update_tag()
 
 
 def _fits(values: list) -> bool:
-    """Whether `kept` writes such values of a bone; earlier ones are without its place, or without modes."""
+    """Whether `kept` writes such values of a bone; older files lack its place, or modes."""
     return (
         4 <= len(values) <= 6
         and values[0] in MODES
@@ -77,9 +77,9 @@ def _modes(bone, written: set[str]) -> list[str]:
 
 
 def _written_since(bone, mode: str, more: list, written: set[str]) -> str:
-    """The mode in which animation turns a bone that it did not turn when it was kept; empty where there is none."""
+    """The mode in which animation turns a bone that it did not turn when it was stored; empty if there is none."""
     then, found = (more[1] if len(more) > 1 else list(CHANNELS)), _modes(bone, written)
-    plays = mode in found or (mode not in CHANNELS and "XYZ" in found)  # all orders of Euler angles are one channel
+    plays = mode in found or (mode not in CHANNELS and "XYZ" in found)  # all orders of Euler angles share one channel
     return "" if plays else next((each for each in found if each not in then), "")
 
 
@@ -89,7 +89,7 @@ def _place(bone) -> list[float]:
 
 
 def _bone(armature, name: str, place: list, found: dict):
-    """The bone of this name; else, for it may have got another one, that of no name in `found` that is alone at `place`."""
+    """The bone of this name; otherwise, since it may have been renamed, the only bone at `place` whose name is not in `found`."""
     bones = armature.pose.bones
     if name in bones or not place:
         return bones.get(name)
@@ -99,8 +99,8 @@ def _bone(armature, name: str, place: list, found: dict):
 
 
 def free_modes(armature, bones, modes=tuple(CHANNELS), without=()) -> dict[str, str]:
-    """For each bone the first rotation mode whose values no animation writes, but for NLA tracks of the names `without`; the
-    last one where all are animated.
+    """For each bone, the first rotation mode whose values no animation writes, except NLA tracks of the names `without`; the last
+    one if all are animated.
     """
     written = animated(armature.animation_data, without)
     found = {}
@@ -111,14 +111,14 @@ def free_modes(armature, bones, modes=tuple(CHANNELS), without=()) -> dict[str, 
 
 
 def check_free(armature, bones) -> None:
-    """Refuse bones that something else than their rotation and their parent's turns: hair would be turned twice.
+    """Refuse bones turned by anything other than their own and their parent's rotation: hair would be turned twice.
 
     Raises:
         NeuralocksError: one has a constraint, or does not turn with its parent.
     """
     for name in bones:
         bone = armature.pose.bones.get(name)
-        if bone is None:  # renamed: that is told by who reads the pose
+        if bone is None:  # renamed: whoever reads the pose reports that
             continue
         acting = next((c.name for c in bone.constraints if not c.mute and c.influence), None)
         if acting is not None:
@@ -134,8 +134,8 @@ def check_free(armature, bones) -> None:
 
 
 def values(mode: str, turns: np.ndarray) -> np.ndarray:
-    """What a bone keeps in a rotation mode (T, 3 or 4) for turns (T, 4) wxyz over time, without the leaps that linear
-    curves would swing through.
+    """A bone's values in a rotation mode (T, 3 or 4) for turns (T, 4) wxyz over time, without jumps that linear curves would swing
+    through.
     """
     same = np.array(turns, float)
     same[1:] *= np.cumprod(np.where((same[1:] * same[:-1]).sum(axis=-1) < 0, -1.0, 1.0))[:, None]
@@ -152,7 +152,7 @@ def values(mode: str, turns: np.ndarray) -> np.ndarray:
 
 
 def turn(bone, mode: str, wxyz) -> bool:
-    """Turn a bone in a rotation mode; whether that changed anything."""
+    """Turn a bone in a rotation mode; returns whether that changed anything."""
     wanted = np.array(wxyz, np.float32)
     if mode == "AXIS_ANGLE":
         wanted = np.array(_axis_angle(wxyz), np.float32)

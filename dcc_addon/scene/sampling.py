@@ -33,8 +33,8 @@ from .stepping import step, stepping
 from .watched import watched
 
 BLOCK, MANY = 256, 6000
-"""Frames whose poses are made channels together, at most, and joints in all of these: each frame then costs little, since what
-is done to so few numbers costs as much for one frame as for all, and all of them about a slice of work.
+"""Most frames whose poses are converted to channels together, and most joints in all of them: on so few numbers, one frame costs as
+much as a block, and a block takes about a slice of work.
 """
 
 
@@ -46,9 +46,9 @@ def shown_frame(scene) -> float:
 
 
 def frames_of(scene) -> tuple[int, int]:
-    """First and last frame to sample: those of the scene, and where the panel names others to bake, these too. What is
-    shown and what is baked then remember the same past. Without a window those that the opened file had, too: a render
-    farm gives each machine a part of them (-s 100 -e 120), and all parts must remember what the whole would.
+    """First and last frame to sample: those of the scene, and those that the panel names for the bake, so that view and bake
+    remember the same past. Without a window, also those that the file had when it was opened: a render farm gives each machine a
+    part of them (-s 100 -e 120), and all parts must remember what the whole would.
     """
     settings, ranges = scene.neuralocks, [(scene.frame_start, scene.frame_end)]
     if not settings.use_scene_range:
@@ -59,7 +59,7 @@ def frames_of(scene) -> tuple[int, int]:
 
 
 def timing_of(scene) -> tuple:
-    """What a sampling depends on of the scene: frames, sub-frames, rate, unit."""
+    """What a sampling depends on in the scene: frames, sub-frames, rate, unit."""
     return (
         *frames_of(scene),
         scene.neuralocks.subframes,
@@ -69,7 +69,7 @@ def timing_of(scene) -> tuple:
 
 
 def key_of(armature, scene) -> tuple:
-    """What a sampling of this armature depends on besides its animation; first `timing_of`."""
+    """What a sampling of this armature depends on besides its animation; begins with `timing_of`."""
     settings, bodies = armature.neuralocks_character, bodies_of(armature, scene)
     return (
         timing_of(scene),
@@ -81,23 +81,23 @@ def key_of(armature, scene) -> tuple:
 
 
 def rigging_of(armature, scene) -> int:
-    """A number that changes when what moves this armature, its hair or its bodies is put together otherwise."""
+    """A number that changes when the setup that moves this armature, its hair or its bodies changes."""
     return rigging([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)])
 
 
 def posture_of(armature, scene) -> int:
-    """A number that changes when this armature, or what it depends on, is posed otherwise by what is not keyed; hair bones
-    count as they are without the hair's motion.
+    """A number that changes when unkeyed values pose this armature, or what it depends on, differently; hair bones count as they
+    are without the hair's motion.
     """
     return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)])
 
 
 def in_slices(context, armature, seconds: float = math.inf) -> Iterator[tuple[int, int]]:
-    """Sample an armature's motion, `seconds` at a time, and put it into the session at the end; yields (done, total) between
-    two slices, when the scene is as it was before, to be looked at and edited.
+    """Sample an armature's motion, `seconds` at a time, and put it into the session at the end; yields (done, total) between two
+    slices, when the scene is as it was before, and can be viewed and edited.
 
     Raises:
-        NeuralocksError: the armature cannot be sampled, in plain words.
+        NeuralocksError: the armature cannot be sampled; says why in plain words.
     """
     scene, frames = context.scene, _sample(context, armature)
     while True:
@@ -125,8 +125,8 @@ def _sample(context, armature) -> Iterator[tuple[int, int]]:
 
 
 class _Recording:
-    """An armature's motion, and that of what it carries, while the scene's frames are stepped. Poses become channels some
-    frames at a time: for hundreds of bones all at once would hold Blender up for seconds.
+    """An armature's motion, and that of what it carries, while the scene's frames are stepped. Poses are converted to channels some
+    frames at a time: for hundreds of bones, all at once would block Blender for seconds.
     """
 
     def __init__(self, context, armature):
@@ -156,16 +156,16 @@ class _Recording:
         self.reader = None
 
     def take(self, row: int) -> None:
-        """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are found
-        anew, since handlers may have changed them.
+        """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are looked up
+        again, since handlers may have changed them.
         """
         layer = None if row else layer_of(named(self.name), self._scene)
         if layer is not None and layer.depsgraph is None:
-            # Blender writes poses back into objects only from what it has evaluated for itself, not in a scene that it has never
-            # shown: what the first frame's reading tags would be at the file's frame.
+            # Blender writes poses back to objects only after its own evaluation, which a scene that was never shown has not had:
+            # objects tagged by reading the first frame would be at the file's frame.
             graph_of(self._scene, layer)
         if row and abs(shown_frame(self._scene) - self.frames[row - 1]) > 1e-3:
-            step(self._scene, self.frames[row - 1])  # a simulation goes on from the frame before it only
+            step(self._scene, self.frames[row - 1])  # a simulation continues only from the previous frame
         step(self._scene, self.frames[row])
         armature = named(self.name)
         layer = layer_of(armature, self._scene)
@@ -173,7 +173,7 @@ class _Recording:
             raise hidden(armature)
         tracked = [named(name) for name in self._tracked]
         with watched(self._scene, layer, tracked) as any_hidden:
-            if any_hidden:  # shape keys among these are still those of another frame
+            if any_hidden:  # their shape keys are still those of another frame
                 step(self._scene, self.frames[row])
                 armature, tracked = named(self.name), [named(name) for name in self._tracked]
             with working_in(self._scene, layer):
@@ -195,7 +195,7 @@ class _Recording:
             self._bind = self._place @ self._rig.rest
             self._trim = trim_of(self._bind, self.name)
             binds = bind_places(self._context, armature, self._tracked, self.reader, self._rig.rest)
-            # Not even rounding may move what stands already: what is pushed out of a body would leap.
+            # Not even rounding may move what already stands upright: hair pushed out of a body would jump.
             up = np.eye(4) if np.array_equal(self._place, here) else self._place @ np.linalg.inv(here)
             self._binds = {name: up @ bind for name, bind in binds.items()}
             graph = self._context.evaluated_depsgraph_get()
@@ -211,7 +211,7 @@ class _Recording:
             self._bodies_at[row] = [body_drawn.drawn(body, graph) for body in bodies]
 
     def _store(self, first: int, end: int) -> None:
-        """Make channels of the poses of some rows."""
+        """Convert the poses of some rows to channels."""
         rows, kept = slice(first, end), slice(end - first)
         check_placed(self._places[""][rows], self.frames[rows], self.name)
         drawn = self.reader.posed(self._pose[kept], self._places[""][rows])
@@ -235,12 +235,12 @@ class _Recording:
         self._heads[rows], self._shown[rows] = joints[:, self._head], world[:, self._head]
 
     def _moved(self, joint: int) -> np.ndarray:
-        """World transforms (T, 4, 4) of a joint as Blender gave them, but for rounding to single precision."""
+        """World transforms (T, 4, 4) of a joint as Blender gave them, except for rounding to single precision."""
         return self._drawn[:, joint].astype(float) @ np.linalg.inv(self._trim[joint])
 
     def sampled(self) -> Generator[tuple[int, int], None, SampledRig]:
-        """What was read, as the character and clip that live view and bake use; yields (done, total) where a large body would
-        hold Blender up.
+        """What was read, as the character and clip that live view and bake use; yields (done, total) while a large body would block
+        Blender.
         """
         rig, places, done = self._rig, self._places, (len(self.frames), len(self.frames))
         motion, binds = Motion.joined(self._parts, places), self._binds

@@ -11,7 +11,7 @@ from .paths import full, library_of
 
 
 class Remade:
-    """Settings of this file that name a file beside it, written as they must be in another folder."""
+    """Settings of this file that name a file relative to it, rewritten for another folder."""
 
     def __init__(self, target: str, settings):
         self._source, folder = bpy.data.filepath, os.path.dirname(target)
@@ -26,7 +26,7 @@ class Remade:
                     set_path(thing, setting, relative(full(path), folder))
 
     def put_back(self) -> None:
-        """Take that back if this is still the file that it was: after a copy was saved, or nothing was."""
+        """Undo that if the file's own path has not changed: after a copy was saved, or nothing was."""
         if bpy.data.filepath != self._source:
             return
         for name, setting, path in self._kept:
@@ -34,12 +34,12 @@ class Remade:
 
 
 def named_here(path: str) -> str:
-    """An absolute path as it is named in this file, so that both can be moved together; itself while this is not saved."""
+    """An absolute path as it is named in this file, so that both can be moved together; unchanged while the file is not saved."""
     return relative(path, os.path.dirname(bpy.data.filepath)) if bpy.data.filepath else path
 
 
 def relative(path: str, folder: str) -> str:
-    """An absolute path as it is named in a file in `folder`, so that every system finds it; itself on another drive."""
+    """An absolute path as it is named in a file in `folder`, so that every system finds it; unchanged on another drive."""
     if os.path.splitdrive(path)[0] != os.path.splitdrive(folder)[0]:
         return path
     return bpy.path.relpath(path, start=folder).replace(os.sep, "/")

@@ -5,11 +5,10 @@ from .animated import animated
 
 
 def enabled(thing, layer, mode: str = "VIEWPORT") -> bool:
-    """Whether a view layer evaluates an object for itself. The eye of the outliner does not count: it hides from view
-    only.
+    """Whether a view layer evaluates an object for itself. The eye in the outliner does not count: it only hides from view.
 
     Args:
-        mode: as of a depsgraph, "VIEWPORT" or "RENDER", for things may be disabled in either.
+        mode: as of a depsgraph, "VIEWPORT" or "RENDER", since things may be disabled in either.
     """
     if mode == "VIEWPORT" and thing.visible_get(view_layer=layer):
         return True
@@ -24,7 +23,7 @@ def in_renders(thing, scene) -> bool:
 
 
 def _within(branch, collections: set, off: str) -> bool:
-    """Whether a branch of a view layer takes in one of some collections; a child may be in though its parent is out."""
+    """Whether a branch of a view layer includes one of some collections; a child may be included while its parent is not."""
     if getattr(branch.collection, off):
         return False
     own = branch.collection in collections and not branch.exclude

@@ -47,6 +47,6 @@ class stepping:
             for name, turned in self._live.items():
                 if (armature := find(name)) is not None:
                     rotations.give_back(armature, turned)
-            bpy.context.view_layer.update()  # what is put back is no edit of the artist's
+            bpy.context.view_layer.update()  # what is restored is not an edit of the artist's
         finally:
             session.paused -= 1

@@ -5,8 +5,8 @@ from .guests import homes
 
 
 def drawn_with(scene) -> list:
-    """The scene and those whose layers its compositor takes in, each after those whose characters it draws. Blender tells
-    before it renders the scene strips of the sequencer, of these it does not.
+    """The scene and those whose layers its compositor uses, each after those whose characters it draws. Blender calls handlers
+    before it renders scene strips of the sequencer, but not before these.
     """
     found = [scene]
     if scene.render.use_compositing:

@@ -5,14 +5,14 @@ UV map name unchanged. The name is kept in a property of the Curves, so it is sa
 
 
 def possible(data) -> bool:
-    """Whether these Curves can be changed, and those of no other object with them."""
+    """Whether these Curves can be changed without changing another object's."""
     if data.library is not None or data.override_library is not None or data.users - data.use_fake_user > 1:
         return False
     return hasattr(data, "surface_uv_map")
 
 
 def unbind(data, kept: str) -> None:
-    """Take the UV map's name away, and remember it under the name `kept`."""
+    """Remove the UV map's name, and remember it under the name `kept`."""
     if possible(data) and data.surface_uv_map:
         data[_key(kept)] = data.surface_uv_map
         data.surface_uv_map = ""

@@ -14,7 +14,7 @@ from .lookup import find
 PLACE = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
 """Channels of objects and of bones, and their sizes."""
 _CHANNEL = re.compile(rf'(pose\.bones\["(\\.|[^"\\])*"\]\.)?({"|".join(PLACE)})')
-"""Paths of these: what else is called so, a modifier's scale say, is kept by itself."""
+"""Paths of these channels: other properties of such names, such as a modifier's scale, are stored separately."""
 
 
 class Unkeyed:
@@ -32,7 +32,7 @@ class Unkeyed:
         ]
 
     def put_back(self) -> None:
-        """Give what has changed since its value again."""
+        """Restore the values that have changed since."""
         for kind, name, within, path, value in self._others:
             owner = _owner(getattr(bpy.data, kind).get(name), within)
             if owner is not None and value_of(owner, path) not in (None, value):
@@ -52,7 +52,7 @@ class Unkeyed:
 
 
 def value_of(owner, path: str):
-    """Number, text or list of numbers; None where there is no such property any more."""
+    """Number, text or list of numbers; None if there is no such property any longer."""
     try:
         value = owner.path_resolve(path)
     except ValueError:
@@ -63,7 +63,7 @@ def value_of(owner, path: str):
 
 
 def _kinds() -> list[str]:
-    """What of `bpy.data` may have keys."""
+    """Collections of `bpy.data` whose members may have keys."""
     lists = [p for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
     return [p.identifier for p in lists if "animation_data" in p.fixed_type.properties]
 
@@ -74,7 +74,7 @@ def _owner(thing, within: bool):
 
 
 def _written(owner, placed: bool) -> list[tuple[str, object]]:
-    """Paths that animation writes, and their values; without those of PLACE where these are `placed`, as objects are."""
+    """Paths that animation writes, and their values; without those of PLACE if it is `placed`, as objects are."""
     data = getattr(owner, "animation_data", None)
     if data is None or not (data.action is not None or len(data.nla_tracks)):
         return []
@@ -126,7 +126,7 @@ def _channels(thing) -> dict[tuple, np.ndarray]:
 
 
 def _own(owner) -> list:
-    """Numbers among the custom properties: switches between IK and FK, say."""
+    """Numbers among the custom properties, such as switches between IK and FK."""
     return [(f'["{key}"]', value) for key, value in owner.items() if isinstance(value, (int, float))]
 
 

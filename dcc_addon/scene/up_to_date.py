@@ -11,8 +11,8 @@ from .stepping import step, stepping
 
 
 def ensure(context, armature, looking: bool = False) -> SampledRig:
-    """The sampled motion, sampled now if there is none or it is stale; `looking`, also where some of its frames are not as
-    they were.
+    """The sampled motion, sampled now if there is none or it is stale; with `looking`, also if some of its frames are not as they
+    were.
     """
     notice(armature, context.scene)
     found = session.rigs.get(armature.name_full)
@@ -25,8 +25,8 @@ def ensure(context, armature, looking: bool = False) -> SampledRig:
 
 
 def _as_sampled(context, armature, sampled: SampledRig) -> bool:
-    """Whether the first frame, the last one and one between show the armature as it was sampled: much of what moves a rig
-    Blender does not tell of, and no list of it is whole.
+    """Whether the first frame, the last one and one between show the armature as it was sampled: Blender does not report much of
+    what moves a rig, and no list of it is complete.
     """
     scene, name, frames = context.scene, armature.name_full, sampled.motion.frames
     read = sampled.moving(any(hair.neuralocks_hair.resolve for hair in hairs_of(armature, scene)))
@@ -34,7 +34,7 @@ def _as_sampled(context, armature, sampled: SampledRig) -> bool:
         for row in {0, len(frames) // 2, len(frames) - 1}:
             step(scene, frames[row])
             layer, reader = layer_of(named(name), scene), session.readers.get(name)
-            if layer is None or reader is None:  # that is told where hair is moved
+            if layer is None or reader is None:  # reported where hair is moved
                 return True
             with working_in(scene, layer):
                 evaluated = named(name).evaluated_get(context.evaluated_depsgraph_get())
@@ -45,8 +45,8 @@ def _as_sampled(context, armature, sampled: SampledRig) -> bool:
 
 
 def notice(armature, scene) -> None:
-    """See whether a sampled motion is out of date although no action was edited: other strips, drivers, constraints, or
-    what is not keyed posed otherwise, which counts in all frames.
+    """Check whether a sampled motion is out of date although no action was edited: strips, drivers or constraints changed, or
+    unkeyed values, which count in all frames.
     """
     sampled = session.rigs.get(armature.name_full)
     if sampled is not None and not sampled.stale:

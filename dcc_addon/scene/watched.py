@@ -12,9 +12,8 @@ from .shown import enabled
 
 @contextmanager
 def watched(scene, layer, things):
-    """Meanwhile Blender evaluates objects of a view layer, be they hidden or disabled: an empty depends on them. Those that
-    hang plainly on what carries them go without: to make empties and to remove them takes time in every frame. Gives whether
-    there are any.
+    """In this block, Blender evaluates objects of a view layer even if they are hidden or disabled: an empty depends on them. Those
+    that simply follow their parent need none: making and removing empties takes time in every frame. Gives whether there are any.
     """
     hidden, probes = [t for t in things if scene.library is None and _needs(t, layer)], []
     try:
@@ -42,7 +41,7 @@ def _needs(thing, layer) -> bool:
 
 
 def _moves(thing) -> bool:
-    """Whether an object, or its shape, is moved by more than its parent, or by that in a way that Blender alone knows."""
+    """Whether an object, or its shape, is moved by more than its parent, or by the parent in a way that only Blender knows."""
     keys = getattr(thing.data, "shape_keys", None)
     if thing.animation_data is not None or len(thing.constraints) or (keys and keys.animation_data):
         return True

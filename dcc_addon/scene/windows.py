@@ -7,22 +7,20 @@ from .guests import homes
 
 
 def scenes_shown() -> list:
-    """The scene of the context, and those of all windows; then those whose characters these draw."""
+    """The scene of the context and those of all windows, then the scenes whose characters they draw."""
     windows = bpy.context.window_manager.windows
     found = [bpy.context.scene, *(window.scene for window in windows)]
     return list(dict.fromkeys([*found, *(home for scene in found for home in homes(scene))]))
 
 
 def drawing(scene) -> list:
-    """The scene, and those shown that draw a character of it; last the one in view."""
+    """The scene, and shown scenes that draw one of its characters; last the one in view."""
     found = {scene, *(shown for shown in scenes_shown() if scene in homes(shown))}
     return sorted(found, key=lambda each: each == bpy.context.scene)
 
 
 def layer_shown(scene):
-    """The view layer in which a scene is shown, the first where it is not; whether hair moves in it is seen to where that
-    is read.
-    """
+    """The view layer in which a scene is shown, or the first if it is not; callers check whether hair moves in it."""
     if scene == bpy.context.scene:
         return bpy.context.view_layer
     windows = bpy.context.window_manager.windows

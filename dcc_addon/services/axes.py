@@ -3,7 +3,7 @@
 
 import numpy as np
 
-# The same turn with which `usd.border.units` reads a stage that is Z up: one result by either way.
+# The same rotation with which `usd.border.units` reads a Z-up stage: both ways give one result.
 _TURN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 

@@ -23,7 +23,7 @@ def chains_of(character: Character, patterns: str = "", name: str = "skeleton") 
 
     Args:
         character: with its body, if that is known.
-        patterns: names of first joints, separated by commas; found by themselves where empty.
+        patterns: names of first joints, separated by commas; if empty, chains are found automatically.
         name: what errors call it.
 
     Raises:
@@ -38,7 +38,7 @@ def chains_of(character: Character, patterns: str = "", name: str = "skeleton") 
 
 def own_turns(own: np.ndarray, motion: Motion, joints: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Rotations (T, N, 4) wxyz that the bones' own channels gave joints (N,) at frames (T,), in their own rest axes; `own` as
-    in `SampledRig`. What is flat has none.
+    in `SampledRig`. Flat bones have none.
     """
     linear = own[[motion.row(frame) for frame in frames]][:, joints]
     turned = np.where(flat(linear, NONE)[..., None, None], np.eye(3), linear)
@@ -59,8 +59,8 @@ class LiveBones:
     Attributes:
         model: the rig model.
         bones: names of the hair bones, (N), as in Blender.
-        joints: their places in the skeleton, (N,).
-        chains: this rig's, which have every joint of the model's.
+        joints: their indices in the skeleton, (N,).
+        chains: this rig's, with every joint of the model's chains.
     """
 
     model: RigModel
@@ -83,7 +83,7 @@ class LiveBones:
             self._clip, self._carried = clip, CarriedHair(self.model, self.joints, character, clip)
 
     def turns(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
-        """Rotations (T, N, 4) wxyz of the hair bones in their own rest axes, at times (T,) [s]; joints (T, J, 4, 4) are
-        the poses drawn.
+        """Rotations (T, N, 4) wxyz of the hair bones in their own rest axes, at times (T,) [s]; joints (T, J, 4, 4) are the drawn
+        poses.
         """
         return self.model.chains.turns_on(self.chains, self._carried.turns(times, strength, joints))

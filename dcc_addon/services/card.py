@@ -17,11 +17,11 @@ SHOWN = (
     "settling_s",
     "jitter_mm",
 )
-"""What an artist can see in the hair and do something about; energies, say, are for who compares solvers."""
+"""What an artist can see in the hair and act on; energies, for example, are for comparing solvers."""
 
 
 def lines_of(card: Card) -> list[str]:
-    """One line a measure, without those that could not be measured; then the notes."""
+    """One line per measure, without those that could not be measured; then the notes."""
     lines = []
     for values in card.grooms.values():
         for key in SHOWN:
@@ -33,6 +33,6 @@ def lines_of(card: Card) -> list[str]:
 
 
 def _plain(value: float) -> str:
-    """A number to three digits, of which two at most are after the point; what is less than these is 0."""
+    """A number to three digits, with at most two after the point; smaller values are 0."""
     places = 2 if abs(value) < 10 else 1 if abs(value) < 100 else 0
     return f"{round(value, places) + 0.0:.{places}f}".rstrip("0").rstrip(".") if places else f"{value:.0f}"

@@ -10,14 +10,14 @@ from neuralocks_core.rotation import transformed
 from .motion import KEPT_TO, TOLERANCE
 
 FAR = 200.0
-"""Up to so many units from the origin, what counts as no motion grows with the distance; a person in centimetres is as large."""
+"""Up to this many units from the origin, the tolerance for no motion grows with the distance; a person in centimetres is this
+large."""
 ROUNDED = 16 * KEPT_TO
-"""Beyond that, it grows with how Blender's single precision rounds places there alone."""
+"""Beyond that, it only grows with the rounding of places in Blender's single precision."""
 
 
 def on_joint(places: np.ndarray, objects: np.ndarray, joints: np.ndarray, bind: np.ndarray) -> np.ndarray | None:
-    """The place (4, 4) in the bind pose of something that goes with a joint throughout, by whatever means; None where its
-    motion does not say so.
+    """The place (4, 4) in the bind pose of something that moves with a joint throughout, by whatever means; None if it does not.
 
     Args:
         places, objects, joints: world transforms (T, 4, 4) of it, of the armature object and of the joint.
@@ -31,8 +31,8 @@ def on_joint(places: np.ndarray, objects: np.ndarray, joints: np.ndarray, bind: 
 def carrier_below(
     places: np.ndarray, heads: np.ndarray, below: Sequence[int], moved: Callable[[int], np.ndarray]
 ) -> int | None:
-    """The joint below the head that something goes with which does not go with the head: the jaw of a beard; None where there
-    is none.
+    """The joint below the head that something moves with if it does not move with the head, such as a beard with the jaw; None if
+    there is none.
 
     Args:
         places, heads: world transforms (T, 4, 4) of it and of the head.
@@ -49,8 +49,8 @@ def carrier_below(
 
 
 def strays(path: np.ndarray, carriers: Sequence[np.ndarray]) -> float:
-    """How far a path (T, 3) leads, at most, from where that of some carriers would take its first point which it follows
-    most closely; each is world transforms (T, 4, 4).
+    """The largest distance of a path (T, 3) from where the carrier that it follows most closely would take its first point;
+    carriers are world transforms (T, 4, 4).
     """
     able = [carrier for carrier in carriers if np.linalg.det(carrier[0])]  # not those hidden by a scale of zero
     firsts = [transformed(path[0], np.linalg.inv(carrier[0])) for carrier in able]
@@ -59,6 +59,6 @@ def strays(path: np.ndarray, carriers: Sequence[np.ndarray]) -> float:
 
 
 def _still(places: np.ndarray, carriers: np.ndarray) -> bool:
-    """Whether something (T, 4, 4) does not move against what carries it (T, 4, 4)."""
+    """Whether something (T, 4, 4) does not move relative to what carries it (T, 4, 4)."""
     relative, far = np.linalg.inv(carriers) @ places, float(np.abs(places).max())
     return bool(np.ptp(relative, axis=0).max() <= TOLERANCE * max(1.0, min(far, FAR)) + ROUNDED * far)

@@ -9,17 +9,17 @@ from neuralocks_core.rotation import flat, volumes
 from .rig import RigArrays
 
 NONE, HIDDEN = 1e-6, 1e-4
-"""A scale below the first is none, for Blender has single precision; what is hidden by that has the second instead."""
+"""A scale below the first counts as zero, since Blender has single precision; what it hides gets the second instead."""
 
 
 def unhidden(joints: np.ndarray, rig: RigArrays, needed: set[int], frames: np.ndarray) -> np.ndarray:
-    """Joints (T, J, 4, 4) of which none is flat or mirrored: a prop is hidden by a scale of zero; it becomes HIDDEN times as
-    large, and turns as its parent does. What is mirrored has its first axis turned round.
+    """Joints (T, J, 4, 4), none flat or mirrored. A prop hidden by a scale of zero becomes HIDDEN times as large, and turns as its
+    parent does. Mirrored joints get their first axis reversed.
 
     Args:
         joints: over time.
         rig: whose they are.
-        needed: joints that hair needs, with those that they hang from; these may be neither.
+        needed: joints that hair needs, with those above them; they must be neither flat nor mirrored.
         frames: (T,), for messages.
 
     Raises:
@@ -42,7 +42,7 @@ def unhidden(joints: np.ndarray, rig: RigArrays, needed: set[int], frames: np.nd
 
 
 def check_placed(places: np.ndarray, frames: np.ndarray, name: str) -> None:
-    """Refuse an armature that is scaled to nothing, or mirrored in some frames: all its bones are then, and none of them is to blame.
+    """Refuse an armature that is scaled to zero, or mirrored, in some frames: then all its bones are, and none is to blame.
 
     Args:
         places: world transforms (T, 4, 4) of the armature.
@@ -64,7 +64,7 @@ def check_placed(places: np.ndarray, frames: np.ndarray, name: str) -> None:
 
 
 def _check(wrong: np.ndarray, needed: set[int], what: str, rig: RigArrays, frames: np.ndarray) -> None:
-    """Refuse what is `wrong` (T, J) with a joint that is needed."""
+    """Refuse a needed joint that is `wrong` (T, J)."""
     for joint in np.flatnonzero(wrong.any(axis=0)):
         if joint in needed:
             raise NeuralocksError(

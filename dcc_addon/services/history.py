@@ -10,7 +10,7 @@ BLOCK = 8
 
 
 class SampledBoundary:
-    """What a network reads of the body, as `BoundarySampler.vectors` has it, bit for bit.
+    """What a network reads of the body, bit for bit as from `BoundarySampler.vectors`.
 
     Args:
         sampler: of the character in its clip.

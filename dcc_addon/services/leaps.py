@@ -11,7 +11,7 @@ MOST = 6
 
 
 def leaps_told(clip: Clip, joint: int, frames: np.ndarray) -> tuple[str, ...]:
-    """Lines for the panel, of motion that does not loop: a loop has no cuts.
+    """Lines for the panel, for motion that does not loop: a loop has no cuts.
 
     Args:
         clip: the motion, with its cuts.

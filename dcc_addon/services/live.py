@@ -31,7 +31,7 @@ class LiveHair:
         groom: strands in bind world space [m].
         character: whose head carries them.
         model: the network.
-        say: told the share that is done; what it raises ends the work.
+        say: called with the share that is done; an exception from it ends the work.
 
     Attributes:
         another_body: by which measure the character differs from those that the model has learned, "" where it does not.
@@ -101,7 +101,7 @@ class LiveHair:
         wanted = vector.tobytes(), matrix.tobytes(), shape.tobytes(), joints.tobytes() if resolve else b""
         if wanted == self._shown:
             return self._points
-        self._shown = b""  # until it is done
+        self._shown = b""  # until the new frame is done
         placing = Placing.of(matrix, self._centre)
 
         def place(strands: slice, displacement: np.ndarray) -> None:

@@ -16,8 +16,8 @@ def mirrored(body: BodyArrays, reflection: np.ndarray, partner: np.ndarray, merg
     Args:
         body: with points (V, 3) in its own space.
         reflection: (4, 4) in that space.
-        partner: of each vertex group, the one that its image is in, (G,) int.
-        merge: vertices that are nearer than this to their image are one with it, in the body's unit; none if negative.
+        partner: for each vertex group, the group of its mirror image, (G,) int.
+        merge: vertices nearer than this to their image, in the body's unit, are merged with it; none if negative.
 
     Returns:
         body with up to 2 V points.

@@ -17,7 +17,7 @@ from .uneven import ROUNDED, carriable, nearest, sheared, uneven
 TOLERANCE = 1e-4
 """Transforms that differ by less than this (in matrix entries) are the same pose."""
 KEPT_TO = float(np.finfo(np.float32).eps)
-"""What is kept of a number in single precision, relative to it: 2 km from the origin it is as coarse as TOLERANCE."""
+"""Relative precision of stored numbers: 2 km from the origin, it is as coarse as TOLERANCE."""
 
 
 def same_pose(drawn: np.ndarray, kept: np.ndarray) -> np.ndarray:
@@ -26,7 +26,7 @@ def same_pose(drawn: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 
 def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
-    """Transforms (..., 4, 4) with rotation, translation and one scale each, the mean of theirs along the axes.
+    """Transforms (..., 4, 4) with rotation, translation and one scale each, the mean of the scales along the axes.
 
     Raises:
         NeuralocksError: a transform is mirrored, flat or not finite; `subject` names it.
@@ -45,13 +45,13 @@ def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
 
 
 def as_carried(head: np.ndarray, subject: str = "armature") -> np.ndarray:
-    """A world transform (4, 4) of the head as hair is carried by it: as it is where it is scaled unevenly."""
+    """A world transform (4, 4) of the head as it carries hair: unchanged if it is scaled unevenly."""
     even = similar(head, subject)
     return head if uneven(head, even) else even
 
 
 def trim_of(bind: np.ndarray, subject: str = "armature") -> np.ndarray:
-    """Per joint, what (J, 4, 4) makes its bind transform a plain rotation and translation.
+    """Per joint, the transform (J, 4, 4) that makes its bind transform a plain rotation and translation.
 
     Applied to bind and posed transforms alike it cancels; it keeps the scale of an object out of channels of half
     precision.
@@ -82,8 +82,8 @@ def _levels(parents: np.ndarray) -> list[np.ndarray]:
 
 
 def _turned_back(similar: np.ndarray) -> np.ndarray:
-    """Inverses of transforms (..., 4, 4) that rotate, move and scale alike along all axes; a general inverse wakes BLAS
-    threads for each 4x4, in Blender's Python a quarter of the time that playing the frames takes.
+    """Inverses of transforms (..., 4, 4) that rotate, move and scale alike along all axes; a general inverse wakes BLAS threads for
+    each 4x4, which in Blender's Python takes a quarter of the time of playing the frames.
     """
     linear = similar[..., :3, :3]
     result = np.zeros_like(similar)
@@ -153,13 +153,13 @@ class Motion:
         spine.
 
         Args:
-            frames: (T,); rate: frames a second.
+            frames: (T,); rate: frames per second.
             metres_per_unit: the scene's.
             parents: (J,) int, -1 for a root.
             bind: world transforms of every joint in the bind pose, (J, 4, 4); joints: over time, (T, J, 4, 4).
             shape: blend shape weights (T, B).
             places: world transforms (T, 4, 4) of other objects, by name.
-            subject: what messages call the armature.
+            subject: name of the armature in messages.
             head: the joint that carries the hair, whose own transform counts most where bones are scaled unevenly.
 
         Raises:
@@ -210,9 +210,7 @@ class Motion:
         return joints
 
     def gap(self) -> float:
-        """How far the last pose is from the first [degrees]: largest turn of any joint against its parent. A loop has
-        none.
-        """
+        """How far the last pose is from the first [degrees]: largest turn of any joint relative to its parent. A loop has none."""
         cosine = np.abs((self.rotation[0].astype(float) * self.rotation[-1]).sum(axis=-1))
         return float(np.degrees(2 * np.arccos(np.clip(cosine, 0, 1)).max(initial=0.0)))
 
@@ -223,7 +221,7 @@ class Motion:
 
 
 def frame_numbers(start: int, end: int, subframes: int) -> np.ndarray:
-    """Frames to sample from `start` to `end`, `subframes` of each but the last, which has one, (T,)."""
+    """Frames to sample from `start` to `end`, `subframes` per frame except the last, which has one, (T,)."""
     if end < start:
         raise NeuralocksError(f"frame range: it ends at {end}, before its start {start}; set an end after the start")
     return start + np.arange((end - start) * subframes + 1) / subframes

@@ -13,19 +13,19 @@ def identifier(name: str) -> str:
 
 
 def joint_identifier(name: str) -> str:
-    """`name` as the last part of a joint path: with letters of all scripts, for a rig's words say which bone is which, in
-    Japanese ones too. A prim's name is plain, since USD before 24.03 takes no other.
+    """`name` as the last part of a joint path: with letters of all scripts, because a rig's words say which bone is which, also in
+    Japanese. A prim's name is plain ASCII, since USD before 24.03 takes nothing else.
     """
     kept = "".join(c if (c.isalpha() or c.isdecimal()) and f"_{c}".isidentifier() else "_" for c in name) or "_"
     return kept if kept[0].isidentifier() else f"_{kept}"
 
 
 LONGEST = 100
-"""Bytes of an object's name that a file is named with; names may be as long as no file system takes them."""
+"""Bytes of an object's name that are used in a file's name; no file system takes the longest names."""
 
 
 def file_label(name: str) -> str:
-    """`name` as a part of a file's name: with letters of all scripts, for a plain one would be the same for many."""
+    """`name` as a part of a file's name: with letters of all scripts, because a plain name would be the same for many."""
     label = "".join(c if c.isalnum() else "_" for c in name)
     return label.encode()[:LONGEST].decode(errors="ignore")
 
@@ -54,7 +54,7 @@ def joint_paths(bones: list[str], parents: list[int]) -> list[str]:
 
 
 def parents_first(parents: list[int]) -> np.ndarray:
-    """An order (J,) in which every parent comes before its children, else as given."""
+    """An order (J,) in which every parent comes before its children, otherwise as given."""
     order, placed = [], set()
 
     def place(joint: int) -> None:

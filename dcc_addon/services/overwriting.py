@@ -9,10 +9,10 @@ from neuralocks_core.errors import NeuralocksError
 
 
 def untaken(path: Path, label: str, taken) -> Path:
-    """The file `path`; where that is taken, one of its name and `label`, with a number at need.
+    """The file `path`; if that is taken, one named after it and `label`, with a number if needed.
 
     Args:
-        taken: tells of a path whether something else needs the file there.
+        taken: whether something else needs the file at a path.
     """
     numbers = ("" if n == 1 else f"_{n}" for n in itertools.count(1))
     others = (path.with_name(f"{path.stem}_{label}{number}{path.suffix}") for number in numbers)
@@ -20,11 +20,11 @@ def untaken(path: Path, label: str, taken) -> Path:
 
 
 def check_ours(paths, made_here) -> None:
-    """Refuse to write over files of somebody else's.
+    """Refuse to overwrite files made by something else.
 
     Args:
-        paths: of the files to write; some may be there.
-        made_here: tells of a path whether the file there was made by Neuralocks.
+        paths: of the files to write; some may exist.
+        made_here: whether the file at a path was made by Neuralocks.
 
     Raises:
         NeuralocksError: one was not.

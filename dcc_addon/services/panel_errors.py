@@ -36,12 +36,12 @@ WORDS = (
     ("at time code ", "at frame "),
     ("train one with random_materials=True, as the other ways of training do", "train one here"),
 )
-"""What the command line says, and the panel; in this order."""
+"""What the command line says, and what the panel says instead; applied in this order."""
 _CUTS = re.compile(r", or name them all if they are \(--cuts [^)]*\)")
-"""A remedy that the panel has not."""
+"""A remedy that the panel does not have."""
 
 _JOINT = re.compile(r"joint '(?:[^']*/)?([^'/]+)'")
-"""A bone as it is written to a file, with all those that it hangs from."""
+"""A bone as it is written to a file, with all bones above it."""
 
 
 def for_the_panel(text: str) -> str:

@@ -3,7 +3,7 @@
 
 
 def in_words(seconds: float | None) -> str:
-    """With a comma before it, as it follows the share that is done; empty where it is not known."""
+    """The time with a comma before it, since it follows the share that is done; empty if it is not known."""
     if seconds is None:
         return ""
     return f", {max(1, round(seconds))} s left" if seconds < 59.5 else f", {round(seconds / 60)} min left"

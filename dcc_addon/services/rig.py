@@ -53,14 +53,14 @@ class RigArrays:
         return {"head": self.paths[self.bones.index(self.head_bone)]}
 
     def named_head(self) -> int | None:
-        """The bone that is named like a head, whatever the artist chose; None where none is."""
+        """The bone that is named like a head, whatever the artist chose; None if there is none."""
         try:
             return find_humanoid(self.paths, self.parents, self.rest[:, :3, 3])["head"]
         except NeuralocksError:
             return None
 
     def humanoid(self) -> Humanoid:
-        """Which bone is which, found once; the error says it in the words of the panel."""
+        """Which bone is which, found once; errors are in the words of the panel."""
         return self._humanoid
 
     @cached_property
@@ -109,8 +109,8 @@ def joint_weights(body: BodyArrays, bones: tuple[str, ...]) -> tuple[np.ndarray,
         joint, weight = joint_of_group[group], body.weights[:, 2]
         kept = (joint >= 0) & (weight > 0)
         vertex, joint, weight = vertex[kept], joint[kept], weight[kept]
-        # The strongest first, of equal ones the first joint. Rows come nearly in the order of the vertices, which a sort by one
-        # number makes use of: `np.lexsort` by all three takes six times as long.
+        # The strongest first; of equal ones, the first joint. Rows come nearly in the order of the vertices, which a sort by one
+        # number exploits: `np.lexsort` by all three takes six times as long.
         order = np.argsort(vertex * len(bones) + joint, kind="stable")
         vertex, joint, weight = vertex[order], joint[order], weight[order]
         order = np.argsort(2 * weight.max(initial=0) * vertex - weight, kind="stable")
@@ -161,8 +161,8 @@ def same(a: Character, b: Character) -> bool:
 
 
 def size_shown(rig: RigArrays, place: np.ndarray, heads: np.ndarray) -> float:
-    """How much larger than in the bind pose a motion shows the head, whose world transforms (T, 4, 4) are of its channels,
-    as `usd` measures the same in a stage; `place` as for `character`.
+    """How much larger a motion shows the head than the bind pose does, as `usd` measures it in a stage; `heads` are its world
+    transforms (T, 4, 4) from channels, `place` is as for `character`.
     """
     head = rig.humanoid()["head"]
     size = float(np.median(sizes_shown(heads, bind_world(rig, place)[head])))
@@ -170,8 +170,8 @@ def size_shown(rig: RigArrays, place: np.ndarray, heads: np.ndarray) -> float:
 
 
 def stood_up(rig: RigArrays, place: np.ndarray) -> np.ndarray:
-    """Where an armature object that stands at `place` (4, 4) stands in the bind pose: there, without leaning."""
-    similar(place, rig.name)  # or what cannot be used would have no name
+    """Where an armature object at `place` (4, 4) stands in the bind pose: at the same place, upright."""
+    similar(place, rig.name)  # for an error with the rig's name
     result = np.array(place, float)
     result[:3, :3] = standing(result[:3, :3], rig.rest[:, :3, 3], rig.humanoid(), np.array([0.0, 0.0, 1.0]))
     return result
@@ -187,7 +187,7 @@ def skin(body: BodyArrays, place: np.ndarray) -> tuple[np.ndarray, np.ndarray, d
     """Points (V, 3) float32, triangles (F, 3) and shape key offsets (V, 3) float32 of a body that stands at `place`, in
     Blender's world: what an exported stage stores.
 
-    Pushing hair out of a body is not continuous: one that differs in its seventh digit moves a strand by centimetres.
+    Pushing hair out of a body is not continuous: a difference in the seventh digit may move a strand by centimetres.
     """
     points = transformed(body.points, place).astype(np.float32)
     shapes = {name: (offsets @ place[:3, :3].T).astype(np.float32) for name, offsets in body.shapes.items()}
@@ -196,7 +196,7 @@ def skin(body: BodyArrays, place: np.ndarray) -> tuple[np.ndarray, np.ndarray, d
 
 
 def _body(body: BodyArrays, place: np.ndarray, core: np.ndarray, bones: tuple[str, ...], labels: Iterator[str]) -> Body:
-    """A part of the body, whose shapes take the next of `labels`: two parts may call theirs the same."""
+    """A part of the body, whose shapes take the next of `labels`: two parts may have the same shape names."""
     points, triangles, shapes = skin(body, place)
     shapes = {next(labels): offsets @ core[:3, :3].T for offsets in shapes.values()}
     return Body(transformed(points, core), triangles, *joint_weights(body, bones), shapes)
@@ -211,7 +211,7 @@ def check_strands(name: str, points: np.ndarray, counts: np.ndarray) -> None:
     """Refuse hair that cannot move; the arguments are those of `groom`.
 
     Raises:
-        NeuralocksError: it is empty, of single points or not finite.
+        NeuralocksError: it is empty, has only single points, or is not finite.
     """
     if not len(counts) or not len(points):
         raise NeuralocksError(f"{name}: the hair has no strands; add hair to it or choose another object")
@@ -232,7 +232,7 @@ def groom(
     """The groom in bind world space.
 
     Args:
-        name: what messages call it.
+        name: its name in messages.
         points: (P, 3) in the hair object's space; counts: (S,).
         place: world transform (4, 4) of the hair object in the bind pose.
         metres: of one unit of the bind pose; see `SampledRig.bind_metres`.

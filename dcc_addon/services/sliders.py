@@ -11,10 +11,10 @@ class Slider(NamedTuple):
     """A number that an artist moves, which is 1 for average hair.
 
     Attributes:
-        name: of the setting; those of MATERIAL are called as the core and the command line call them.
+        name: of the setting; those of MATERIAL have the same names as in the core and on the command line.
         label, description: what the panel says.
         low, high: what can be typed in.
-        shown: how far it can be drawn.
+        shown: how far it can be dragged.
     """
 
     name: str

@@ -7,10 +7,10 @@ from neuralocks_core.files import cannot_write
 
 
 def temporary_folder() -> tempfile.TemporaryDirectory:
-    """A new folder, which goes with its `cleanup`, or with its block.
+    """A new folder, which is removed by its `cleanup`, or at the end of its block.
 
     Raises:
-        NeuralocksError: there can be none, as on a full disk.
+        NeuralocksError: it cannot be made, for example on a full disk.
     """
     try:
         return tempfile.TemporaryDirectory(prefix="neuralocks_", ignore_cleanup_errors=True)

@@ -38,7 +38,7 @@ class Threaded:
         return self._thread.is_alive()
 
     def cancel(self) -> None:
-        """Stop at its next word about progress."""
+        """Stop at its next progress report."""
         self._cancelled = True
         if not self._leave:
             self._thread.join()
@@ -64,7 +64,7 @@ class Threaded:
         try:
             self._result = self._function(self._say)
         except BaseException as error:
-            # Its frames would keep what lies in them open, a stage say, and lead back to this object.
+            # Its stack frames would keep their contents open, such as a stage, and lead back to this object.
             traceback.clear_frames(error.__traceback__)
             self._error = error
         finally:
@@ -77,7 +77,7 @@ class Threaded:
 
 
 def loading(*modules: str):
-    """Steps (0, 1, message) of importing modules that take seconds to load at first, the USD libraries say."""
+    """Steps (0, 1, message) of importing modules that take seconds to load at first, such as the USD libraries."""
     if not all(module in sys.modules for module in modules):
         load = Threaded(lambda _: [importlib.import_module(module) for module in modules], "Loading USD", leave=True)
         yield from load.steps(0.0, 0.0)

@@ -7,20 +7,20 @@ import time
 from .training_job import problem
 
 AGAIN = 10.0
-"""So long after its answer [s] a Python that could not train is asked anew: what it lacked may be there by then."""
+"""This long after its answer [s], a Python that could not train is asked again: what it lacked may be there by then."""
 
 
 class Trainers:
     """What is known of Pythons, by their path.
 
     Args:
-        ask: gives why a Python cannot train, empty where it can; called in threads.
+        ask: returns why a Python cannot train, empty if it can; called in threads.
     """
 
     def __init__(self, ask=problem):
         self._ask = ask
         self._answers: dict[str, tuple[str, float]] = {}
-        """Each with the time at which it came [s]."""
+        """Each answer with the time at which it came [s]."""
         self._asked: set[str] = set()
 
     @property
@@ -29,8 +29,8 @@ class Trainers:
         return bool(self._asked)
 
     def known(self, python: str) -> str | None:
-        """Why it cannot train, the latest answer; empty where it can, None where the first one is still to come. Asks for
-        one where that is due, and does not wait for it.
+        """Why it cannot train, by the latest answer; empty if it can, None if the first one is still to come. Asks for a new one if
+        that is due, and does not wait for it.
         """
         answer, when = self._answers.get(python, (None, 0.0))
         due = answer is None or (answer and time.monotonic() - when > AGAIN)

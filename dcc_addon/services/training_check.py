@@ -7,11 +7,11 @@ import sys
 PYTHON = (3, 11)
 """The oldest that the packages run with."""
 CAN = "this Python can train"
-"""What no other program says that ends well."""
+"""What no other program prints on success."""
 
 
 def lacking():
-    """Why this Python cannot train, empty where it can."""
+    """Why this Python cannot train; empty if it can."""
     if tuple(sys.version_info[:2]) < PYTHON:
         return "it is Python " + sys.version.split()[0] + ", and " + ".".join(map(str, PYTHON)) + " or newer is needed"
     for needed in ("torch", "warp", "onnx", "usd.models.train"):
@@ -19,13 +19,13 @@ def lacking():
             importlib.import_module(needed)
         except ModuleNotFoundError as error:
             return "it lacks '" + str(error.name) + "'"
-        except Exception as error:  # a library that its compiled part asks for is missing, say
+        except Exception as error:  # for example, a library that its compiled part needs is missing
             return "its '" + needed + "' does not load (" + (" ".join(str(error).split()) or type(error).__name__) + ")"
     return ""
 
 
 def main():
-    """Say so: the fact to standard error, with exit status 1, or `CAN`."""
+    """Print the reason to standard error, with exit status 1, or print `CAN`."""
     fact = lacking()
     (sys.stderr if fact else sys.stdout).write((fact or CAN) + "\n")
     return 1 if fact else 0

@@ -8,11 +8,11 @@ import os
 import sys
 
 LEARNED, AROUND = 30.0, 100.0
-"""Seconds that the bones' network learns at least, and that the simulations before and the report after it take."""
+"""Seconds that the bones' network learns at least, and that the simulations before it and the report after it take."""
 
 
 def main() -> int:
-    """Train strands or hair bones; exit status 1 with an `error` line for what a user can mend."""
+    """Train strands or hair bones; exit status 1 with an `error` line for what a user can fix."""
     settings = json.load(sys.stdin)
     say = _printer(sys.stdout)
     from neuralocks_core.errors import NeuralocksError
@@ -24,7 +24,7 @@ def main() -> int:
         print(json.dumps({"error": str(error)}), flush=True)
         return 1
     finally:
-        abandon(settings["out"])  # also where Blender is gone: its next training does not go on from there
+        abandon(settings["out"])  # also if Blender is gone: its next training does not resume from there
     return 0
 
 
@@ -40,7 +40,7 @@ def _printer(stream):
 
 
 def _tell(notes) -> None:
-    """What somebody should know of the character, or of what was learned."""
+    """Report notes on the character, or on what was learned."""
     print(json.dumps({"notes": [str(note) for note in notes]}), flush=True)
 
 
@@ -51,7 +51,7 @@ def _train_strands(settings: dict, say) -> None:
     def told(done: int, total: int, message: str) -> None:
         if total == THOUSANDTHS:
             say(done, total, message)
-        else:  # of what comes before the time that it was given
+        else:  # progress of the work before the training time begins
             say(0, 1, message)
             print(json.dumps({"before": done / max(total, 1)}), flush=True)
 

@@ -21,13 +21,13 @@ CHILD = Path(__file__).with_name("training_child.py")
 CHECK = Path(__file__).with_name("training_check.py")
 ADDON = Path(__file__).resolve().parent.parent
 _NEW_GROUP, _NO_WINDOW = 0x00000200, 0x08000000
-"""How Windows starts a program that Ctrl-C in Blender's console does not reach, and that opens no console of its own."""
+"""Flags with which Windows starts a program that Ctrl-C in Blender's console does not reach, and that opens no console."""
 ANSWER = 60
-"""[s] Torch takes so long to load, the first time, from a slow drive."""
+"""[s] Torch may take this long to load, the first time, from a slow drive."""
 _KILLED = 9
-"""The signal of a system that is short of memory."""
+"""The signal that a system short of memory sends."""
 UTF8 = {"encoding": "utf-8", "errors": "replace"}
-"""For a child's input and output. In a code page of Windows, a letter that it lacks would end the reader."""
+"""For a child's input and output. With a Windows code page, a letter that it lacks would end the reader."""
 
 
 def problem(python: str) -> str:
@@ -65,8 +65,8 @@ def problem(python: str) -> str:
 
 
 def installing() -> str:
-    """The command that gives a Python what training needs: with the wheel that lies beside the add-on, or, in a source
-    checkout, with that. No package index has the project.
+    """The command that gives a Python what training needs: with the wheel beside the add-on or, in a source checkout, with the
+    checkout. No package index has the project.
     """
     wheel = next((ADDON / "wheels").glob("neuralocks-*.whl"), None)
     python = "py" if os.name == "nt" else "python3"
@@ -74,8 +74,8 @@ def installing() -> str:
 
 
 def environment() -> dict[str, str]:
-    """This process's environment without what belongs to Blender's own Python; the packages lying beside the add-on can
-    be found. Numpy shares no small matrices among threads, which would wait for each other beside Blender's.
+    """This process's environment without what belongs to Blender's own Python; the packages beside the add-on can be found. Numpy
+    does not split small matrices among threads, which would wait for each other beside Blender's.
     """
     import neuralocks_core
 
@@ -94,7 +94,7 @@ class TrainingJob:
 
     Attributes:
         done, message: progress from 0 to 1, and the latest line with the gauge.
-        notes: what somebody should know of the character, and in the end of what was learned; each once.
+        notes: what somebody should know of the character, and at the end of what was learned; each once.
         error: why it failed, in one line; empty otherwise.
         lines: as many as the panel has needed for a message so far.
         out: the model file that it writes.
@@ -123,7 +123,7 @@ class TrainingJob:
             raise NeuralocksError(
                 f"{python}: cannot be run ({error.strerror}); free some memory, and try again"
             ) from None
-        with suppress(OSError), self._process.stdin as heard:  # one that has ended already says why
+        with suppress(OSError), self._process.stdin as heard:  # a process that has ended already says why
             heard.write(json.dumps(settings))
         self._tail: list[str] = []
         self._threads = [threading.Thread(target=f, daemon=True) for f in (self._listen, self._drain)]
@@ -143,14 +143,12 @@ class TrainingJob:
 
     @property
     def seconds_left(self) -> float:
-        """Estimate from what is done so far; before anything is, from the time that it was given, and what comes before."""
+        """Estimate from what is done so far; before anything is, from the time that it was given, and the work before it."""
         before = 0.0 if self.done else self._before.seconds or 0.0
         return before + self._left.seconds
 
     def cancel(self) -> None:
-        """Stop it, with the processes that it started, and leave nothing of it; without effect on the model of one that has
-        ended well.
-        """
+        """Stop it and the processes that it started, and leave nothing behind; the model of a training that has ended well is kept."""
         self._cancelled = True
         for hard in (False, True):
             if self._process.poll() is None:
@@ -162,7 +160,7 @@ class TrainingJob:
     def _end(self, hard: bool) -> None:
         if os.name == "posix":
             os.killpg(self._process.pid, signal.SIGKILL if hard else signal.SIGTERM)
-        else:  # `terminate` would leave those that it started at work
+        else:  # `terminate` would leave its child processes running
             command = ["taskkill", "/T", "/F", "/PID", str(self._process.pid)]
             subprocess.run(
                 command, stdin=subprocess.DEVNULL, capture_output=True, creationflags=_NO_WINDOW, check=False
@@ -174,7 +172,7 @@ class TrainingJob:
             return self.error
         if self._process.returncode == 0:
             return f"it ended without {self.out}; try again"
-        if self._process.returncode == -_KILLED:  # of what it said before, nothing tells why
+        if self._process.returncode == -_KILLED:  # nothing that it said before tells why
             return "its process was killed; free some memory, and try again"
         return self._tail[-1] if self._tail else f"training ended with status {self._process.returncode}"
 
@@ -185,7 +183,7 @@ class TrainingJob:
                     said = json.loads(line)
                 except ValueError:
                     continue
-                if not isinstance(said, dict):  # what a library prints may be JSON by chance
+                if not isinstance(said, dict):  # a library's output may be JSON by chance
                     continue
                 if "error" in said:
                     self.error = str(said["error"])

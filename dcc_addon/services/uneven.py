@@ -11,22 +11,22 @@ import numpy as np
 from neuralocks_core.rotation import inverses
 
 UNEVEN = 1e-4
-"""Scales that differ by less, relative to their mean, are one."""
+"""Scales that differ by less than this, relative to their mean, are equal."""
 SHEAR = 1e-3
-"""Axes with a smaller cosine between them are at right angles."""
+"""Axes with a smaller cosine between them count as at right angles."""
 ROUNDED = 5e-3
-"""So are those with a smaller one than this, where scales of half precision have turned them."""
+"""So do axes with a smaller cosine than this, if half-precision scales have turned them."""
 
 
 def uneven(transforms: np.ndarray, even: np.ndarray) -> np.ndarray:
-    """Which transforms (..., 4, 4) are more than `even` (..., 4, 4), the same with one scale each."""
+    """Which transforms (..., 4, 4) differ from `even` (..., 4, 4), the same with one scale each."""
     size = np.linalg.norm(even[..., :3, 0], axis=-1)
     return np.abs(transforms[..., :3, :3] - even[..., :3, :3]).max(axis=(-1, -2)) > UNEVEN * size
 
 
 def carriable(joints: np.ndarray, even: np.ndarray, parents: np.ndarray, head: int | None) -> np.ndarray:
-    """Transforms (T, J, 4, 4) of which a chain can carry the head as it is: where one on the way up from it would be sheared,
-    all above that have one scale. Other joints are as they are; see `nearest`.
+    """Transforms (T, J, 4, 4) of which a chain can carry the head as it is: if one on the way up from it would be sheared, all
+    above that one have one scale. Other joints are unchanged; see `nearest`.
 
     Args:
         joints: world transforms (T, J, 4, 4); even: the same with one scale each.
@@ -51,9 +51,9 @@ def sheared(transforms: np.ndarray, cosine: float = SHEAR) -> np.ndarray:
 
 
 def nearest(above: np.ndarray, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (N, 3, 3) and scales (N, 3) of sheared joints relative to their parents, near to what they are in the world:
-    the rotation is the best with one scale, the scales are the best with this rotation. What is off in one joint does not
-    grow in those below it.
+    """Rotations (N, 3, 3) and scales (N, 3) of sheared joints relative to their parents, near to what they are in the world: the
+    rotation is the best with one scale, the scales are the best with this rotation. An error in one joint does not grow in those
+    below it.
 
     Args:
         above, joints: world transforms (N, 4, 4) of the parents and of the joints.

@@ -13,14 +13,13 @@ _BEFORE = ".before"
 
 @contextmanager
 def undone_on_failure(*paths: Path):
-    """Meanwhile files may be written, each whole or not at all; what was there before, or nothing, comes back unless all
-    ends well.
+    """In this block, files may be written, each whole or not at all; if it fails, the previous files, or none, come back.
 
     Raises:
-        NeuralocksError: what is there cannot be kept meanwhile.
+        NeuralocksError: an existing file cannot be kept meanwhile.
     """
     made = [folder for path in paths for folder in path.parents if not folder.exists()]
-    # Windows removes no file that a program shows: what stays of an earlier time must not be in the way.
+    # Windows does not remove a file that a program uses: left-overs from an earlier time must not be in the way.
     kept = {path: stray_name(path, _BEFORE) for path in paths if path.is_file()}
     try:
         for path in kept:
@@ -31,7 +30,7 @@ def undone_on_failure(*paths: Path):
             yield
         except BaseException:
             for path in paths:
-                with suppress(OSError):  # what went wrong before is what is told
+                with suppress(OSError):  # the earlier error is the one to report
                     if path not in kept:
                         path.unlink(missing_ok=True)
                     elif kept[path].exists():
@@ -45,11 +44,11 @@ def undone_on_failure(*paths: Path):
 
 
 def _keep(path: Path, before: Path) -> None:
-    """Another name for a file, which what is put in its place does not change."""
+    """Give a file another name, so that replacing the original does not change it."""
     try:
         try:
             os.link(path, before)
-        except OSError:  # not on this file system
+        except OSError:  # no hard links on this file system
             shutil.copy2(path, before)
     except OSError as error:
         raise cannot_write(path, error) from None

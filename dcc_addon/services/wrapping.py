@@ -7,12 +7,12 @@ from collections.abc import Callable
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|[cm]?m(?:/s)?|s|deg|degrees|J/kg)(?!\w))")
 """The space between a number and its unit."""
 _SPACE = re.compile(r"[ \t\n\r\f\v]+")
-"""What lines may be broken at: an error of somebody else's may have lines of its own, which a label does not draw."""
+"""Where lines may be broken: an error from elsewhere may have line breaks, which a label does not draw."""
 
 
 def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
-    """Lines of a text, one at least, none wider than `width` by what `measure` says of a line; broken at spaces, and where a
-    word is too wide, within it. A number keeps its unit.
+    """Lines of a text, at least one, none wider than `width` as `measure` gives it; broken at spaces, or within a word that is too
+    wide. A number keeps its unit.
     """
     lines, line = [], ""
     for word in _SPACE.split(_UNIT.sub("\u00a0", text)):
