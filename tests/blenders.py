@@ -17,7 +17,7 @@ def installed() -> list[Path]:
 
 
 def python_of(version: str) -> Path:
-    """The Python of one Blender, such as "4.2"; skips the test where that is not installed."""
+    """The Python of one Blender, such as "4.2"; skips the test if that is not installed."""
     python = ROOT / f".venv-blender-{version}" / "bin" / "python"
     if python not in installed():
         pytest.skip(f"Blender {version} is not installed as a Python module (make blender installs 4.2 and 5.2)")
@@ -25,5 +25,5 @@ def python_of(version: str) -> Path:
 
 
 def packages_of(version: str) -> Path:
-    """The folder of one Blender's installed packages; skips the test where that is not installed."""
+    """The folder of one Blender's installed packages; skips the test if that is not installed."""
     return next((python_of(version).parents[1] / "lib").glob("python*/site-packages"))

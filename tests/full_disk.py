@@ -8,7 +8,7 @@ import pytest
 
 @contextmanager
 def room_for(size: int):
-    """No file grows beyond `size` bytes meanwhile; skips the test where the system has no such limit."""
+    """In this block, no file grows beyond `size` bytes; skips the test if the system has no such limit."""
     resource = pytest.importorskip("resource", reason="limits of file sizes are of Unix")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))

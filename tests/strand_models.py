@@ -16,9 +16,9 @@ def write_random_model(
 ) -> Path:
     """Write a model whose last layer is `gain` times that of an untrained one: 4 moves hair by centimetres, 0 not at all.
 
-    `spec`, `anchored` and `output` are as in its file; those of the models shipped where left out.
+    `spec`, `anchored` and `output` are as in its file; if left out, those of the shipped models.
 
-    Skips the test where torch is not installed.
+    Skips the test if torch is not installed.
     """
     torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
     from neuralocks_core.training.autoencoder import StrandAutoencoder

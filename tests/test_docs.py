@@ -33,7 +33,7 @@ def defined(path: Path) -> set[str]:
 
 @cache
 def modules() -> dict[str, set[str]]:
-    """Module or package -> what it defines; modules of one name count as one."""
+    """Module or package -> what it defines; modules of the same name count as one."""
     found: dict[str, set[str]] = {}
     for folder in FOLDERS[:3]:
         for path in (ROOT / folder).rglob("*.py"):
@@ -45,8 +45,8 @@ def modules() -> dict[str, set[str]]:
 
 @cache
 def classes() -> dict[str, set[str]]:
-    """Class -> its fields, methods and what its methods set, those of the classes that it is made from, too; classes of one
-    name count as one.
+    """Class -> its fields, methods and what its methods set, including those of its base classes; classes of the same name count as
+    one.
     """
     own: dict[str, set[str]] = {}
     bases: dict[str, set[str]] = {}
@@ -63,7 +63,7 @@ def classes() -> dict[str, set[str]]:
 
 
 def members(node: ast.ClassDef) -> set[str]:
-    """What stands in the body of a class, and what its methods set of `self`."""
+    """What is in the body of a class, and what its methods set on `self`."""
     names = {each.name for each in node.body if isinstance(each, ast.FunctionDef)}
     for each in node.body:
         if isinstance(each, ast.Assign | ast.AnnAssign):
@@ -97,7 +97,7 @@ def test_what_is_named_exists(document):
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_headings_that_are_linked_are_there(document):
-    """As GitHub makes anchors of them: in small letters, spaces as hyphens, without other signs."""
+    """As GitHub turns them into anchors: lower case, spaces as hyphens, without other signs."""
     for file, anchor in re.findall(r"\]\(([^)#:\s]*)#([^)\s]+)\)", (ROOT / document).read_text("utf-8")):
         there = ((ROOT / document).parent / file if file else ROOT / document).read_text("utf-8")
         headings = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", there, flags=re.M | re.S), re.M)
@@ -106,7 +106,7 @@ def test_headings_that_are_linked_are_there(document):
 
 @cache
 def arguments() -> dict[str, set[str]]:
-    """What functions, classes and `Class.method`s can be given by name; those of one name count as one."""
+    """Keyword arguments of functions, classes and `Class.method`s; those of the same name count as one."""
     found: dict[str, set[str]] = {}
 
     def add(name, node):
@@ -129,13 +129,13 @@ def arguments() -> dict[str, set[str]]:
 def test_arguments_that_are_named_can_be_given(document):
     for code in re.findall(r"`([^`\n]+)`", (ROOT / document).read_text("utf-8")):
         for name, given in re.findall(r"([A-Za-z_][\w.]*)\(([^()]*\w=[^()]*)\)", code):
-            # What stands before a dot may be a class or a module.
+            # The name before a dot may be a class or a module.
             known = arguments().get(name) or arguments().get("" if name[0].isupper() else name.split(".")[-1], set())
             assert set(re.findall(r"(\w+)=", given)) <= known, code
 
 
 def test_the_map_names_modules_that_are_there():
-    """`docs/architecture.md`, Where things are: whatever is in a table's code stands for a module or a folder."""
+    """`docs/architecture.md`, Where things are: whatever is code in a table names a module or a folder."""
     map_ = (ROOT / "docs/architecture.md").read_text("utf-8").split("## Where things are")[1].split("\n## ")[0]
     rows = [line for line in map_.splitlines() if line.startswith("|")]
     named = {name.rstrip("/") for row in rows for name in re.findall(r"`([\w/]+)`", row)}
@@ -147,7 +147,7 @@ def test_the_map_names_modules_that_are_there():
     [("neuralocks_core", "Where things are"), ("usd", "Where things are"), ("dcc_addon", "The Blender add-on")],
 )
 def test_every_module_is_on_the_map(package, section):
-    """Or is a package that is."""
+    """Top-level modules and folders; in `usd`, also the modules in folders."""
     text = (ROOT / "docs/architecture.md").read_text("utf-8").split(f"## {section}")[1].split("\n## ")[0]
     named = {word for code in re.findall(r"`([^`\n]+)`", text) for word in re.findall(r"\w+", code)}
     folders = {path.parent for path in (ROOT / package).glob("*/__init__.py")}
@@ -159,7 +159,7 @@ def test_every_module_is_on_the_map(package, section):
 
 @pytest.mark.parametrize("package", ["neuralocks_core", "usd"])
 def test_nothing_imports_what_stands_further_down_the_map(package):
-    """Rows are of folders, or of the modules of the top level that they name."""
+    """Rows are folders, or the top-level modules that they name."""
     text = (ROOT / "docs/architecture.md").read_text("utf-8").split(f"\n`{package}/`")[1].split("\n\n")[1]
     order = []
     for _, where, what, _ in (row.split("|") for row in text.splitlines()[2:]):
@@ -189,7 +189,7 @@ def imported(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_commands_have_the_options_that_are_written(document):
-    """Of lines that begin with `neuralocks` and one of its commands."""
+    """In lines that begin with `neuralocks` and one of its commands."""
     typer = pytest.importorskip("typer")
     from usd.cli.app import app
 

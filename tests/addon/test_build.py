@@ -20,7 +20,7 @@ def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
 
 
 def test_wheels_are_those_that_the_tests_pass_with():
-    """But for what Blender's own numpy asks for."""
+    """Except what Blender's own numpy requires."""
     kept, own = (build.ROOT / "constraints.txt").read_text("utf-8").split(), build.compiled()
     assert {f"{name}=={version}" for name, version in own.items()} - set(kept) == {f"scipy=={build.HELD_BACK['scipy']}"}
 
@@ -49,7 +49,7 @@ def test_zips_hold_what_blender_expects(tmp_path):
 
 
 def test_the_legacy_zip_brings_numpy(tmp_path, monkeypatch):
-    """Debian's Blender has none; to the others it is their own."""
+    """Debian's Blender has none; the others have their own."""
     made = {}
     monkeypatch.setattr(build, "own_wheel", lambda _: "own")
     monkeypatch.setattr(build, "download", lambda folder, versions, *_: list(versions))

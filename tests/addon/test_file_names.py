@@ -11,7 +11,7 @@ def test_labels_keep_letters_of_all_scripts():
 
 
 def test_what_is_taken_gets_another_name(tmp_path):
-    """The name itself where it is free, else with a label, counted up."""
+    """The name itself if it is free, otherwise with a label and a number."""
     out, taken = tmp_path / "out.usdc", set()
     names = []
     for _ in range(4):

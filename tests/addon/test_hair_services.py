@@ -34,7 +34,7 @@ def test_a_bone_scaled_to_nothing_has_no_turn_of_its_own():
 
 
 def test_live_hair_leaves_an_arm_that_the_network_does_not_read():
-    """One time and one answer of the network, a forearm beside the hair or in it."""
+    """At one time, with one answer of the network: a forearm beside the hair or in it."""
     who, ball = character(), trimesh.creation.icosphere(3, 0.1)
     leaves = [name.rsplit("/", 1)[-1] for name in who.skeleton.names]
     arm = leaves.index("left_lower_arm")
@@ -56,7 +56,7 @@ def test_live_hair_leaves_an_arm_that_the_network_does_not_read():
 
 
 def test_live_hair_rides_on_skin_that_blend_shapes_move():
-    """As a bake's does; what shapes the shot begins with is told by the clip that is followed."""
+    """As in a bake; the clip that is followed tells which shapes the shot begins with."""
     who, ball = character(), trimesh.creation.icosphere(3, 0.1)
     joints, way = np.full((len(ball.vertices), 1), who.head), np.array([0.0, 0.03, 0.01])
     shapes = {"up": np.tile(way, (len(ball.vertices), 1))}
@@ -74,7 +74,7 @@ def test_live_hair_rides_on_skin_that_blend_shapes_move():
 
 
 def test_live_hair_that_follows_another_clip_is_as_if_it_had_followed_no_other():
-    """Of a body that is wider from the first frame on, whose held pose the network answers otherwise."""
+    """The body is wider from the first frame on, and the network answers its held pose differently."""
     who, ball = character(), trimesh.creation.icosphere(3, 0.1)
     joints = np.full((len(ball.vertices), 1), who.head)
     wider = {"wide": ball.vertices * [0.15, 0, 0.15]}

@@ -7,7 +7,7 @@ from dcc_addon.services.panel_errors import for_the_panel, with_objects
 
 
 def test_prims_become_objects():
-    """Each prim its own object, though its path begins like another one's."""
+    """Each prim becomes its own object, even if its path begins like another one's."""
     prims = {"前髪": "/Character/Hair___", "Hair.L": "/Character/Hair_L", "Hair L": "/Character/Hair_L_2"}
     said = with_objects(
         "/Character/Hair_L_2: as /Character/Hair_L, not /Character/Hair___ or /Character/Hair_Lo", prims

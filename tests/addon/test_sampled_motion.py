@@ -21,7 +21,7 @@ from tests.core.rigs import moved, person
 
 
 def _motion(rng, scale=1.0, stretch=0.0):
-    """World transforms (T, J, 4, 4) of a chain that turns at random, and the bind pose."""
+    """World transforms (T, J, 4, 4) of a chain that turns randomly, and the bind pose."""
     bind = scale * rest()
     bind[:, 3, 3] = 1
     turns = from_vector(rng.normal(size=(9, 6, 3)) * 0.4)
@@ -47,7 +47,7 @@ def test_stored_channels_give_the_sampled_poses_back(scale):
 
 
 def test_rounding_does_not_add_up_along_a_chain():
-    """Each joint is stored relative to its parent as that is stored: a long spine ends where Blender has it."""
+    """Each joint is stored relative to its parent as stored: a long spine ends where Blender has it."""
     count, rng = 200, np.random.default_rng(2)
     local = np.tile(np.eye(4), (3, count, 1, 1))
     local[..., :3, :3] = from_vector(0.3 * rng.normal(size=(3, count, 3)))
@@ -70,9 +70,7 @@ def test_stretched_bones_keep_place_and_rotation():
 
 
 def _stretched(rng, apart=()):
-    """World transforms (9, 6, 4, 4) of a chain whose joints turn and scale unevenly at random; those of `apart` inherit no
-    scale.
-    """
+    """World transforms (9, 6, 4, 4) of a chain whose joints turn and scale unevenly at random; those in `apart` inherit no scale."""
     turns, world = from_vector(rng.normal(size=(9, 6, 3)) * 0.4), np.zeros((9, 6, 4, 4))
     for joint, parent in enumerate(PARENTS):
         local = np.tile(np.eye(4), (9, 1, 1))
@@ -96,7 +94,7 @@ def test_channels_carry_what_is_stretched_along_a_chain():
 
 
 def test_a_head_that_inherits_no_stretch_is_exact():
-    """Below it joints have one scale, for a chain cannot carry both; all stay in place."""
+    """Joints below it have one scale, because a chain cannot carry both; all stay in place."""
     world = _stretched(np.random.default_rng(6), apart=(3,))
     motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, rest(), world, np.zeros((9, 0)), {}, head=3)
     made = motion.world()
@@ -126,7 +124,7 @@ def test_samples_are_found_by_frame():
 
 
 def test_a_clips_own_samples_are_what_the_sampler_gives():
-    """Kept or not, in blocks or alone: the same bits, also after a change of look, between samples, for another pose."""
+    """Stored or not, in blocks or alone: the same bits, also after a change of look, between samples, and for another pose."""
     rng, times = np.random.default_rng(3), np.arange(21) / 24
     clip = moved(times, lambda t: np.stack([np.sin(5 * t), 0 * t, t], -1))
     sampler = BoundarySampler(BoundarySpec(), person(), clip)
@@ -145,7 +143,7 @@ def test_a_clips_own_samples_are_what_the_sampler_gives():
 
 @pytest.mark.parametrize("size", [1.0, 0.6, 1.7])
 def test_a_character_is_measured_at_the_size_shown(size):
-    """Bones that scale the head: it stands as it is drawn, and the bind pose is as large as its hair is."""
+    """Bones scale the head: it stands as it is drawn, and the bind pose is as large as its hair."""
     bind, world = _motion(np.random.default_rng(4))
     world[:, 3, :3, :3] *= size
     motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
@@ -154,7 +152,7 @@ def test_a_character_is_measured_at_the_size_shown(size):
 
 
 def test_what_goes_with_the_head_alone_is_on_it():
-    """A hat a metre in front of the head, which turns; where all stands still, or goes with the whole figure, nothing is known."""
+    """A hat a metre in front of a head that turns; if everything stands still, or moves with the whole figure, nothing is known."""
     still = np.tile(np.eye(4), (5, 1, 1))
     turning = still.copy()
     turning[:, :3, :3] = from_vector(np.outer(np.linspace(0, 1, 5), [0, 0, 1]))
@@ -168,8 +166,8 @@ def test_what_goes_with_the_head_alone_is_on_it():
 
 @pytest.mark.parametrize("away", [0.0, 1e4])
 def test_a_beard_goes_with_the_jaw_where_the_head_does_not_take_it_along(away):
-    """The first joint below the head that it does not move against; what a scale of zero hides carries nothing. Far from the
-    origin too, where Blender rounds places.
+    """It rides on the first joint below the head that it does not move relative to; a joint hidden by zero scale carries nothing.
+    This also holds far from the origin, where Blender rounds places.
     """
     heads = np.tile(np.eye(4), (5, 1, 1))
     heads[:, 0, 3] = away
@@ -210,7 +208,7 @@ def test_frame_numbers():
 
 
 def test_leaps_are_told_by_their_frames():
-    """A cut, and two leaps in succession that are none."""
+    """A cut, and two jumps in succession that are not cuts."""
     frames = np.arange(10, 74)
     joints = np.tile(np.eye(4), (64, 1, 1, 1))
     joints[:, 0, 1, 3] = 0.01 * np.sin(np.arange(64))

@@ -46,7 +46,7 @@ def test_joint_paths_are_unique_and_accepted_by_usd():
 
 
 def test_a_rig_with_japanese_names_is_read_by_them():
-    """As MMD's rigs come into Blender: the sides at the end, some numbers of full width."""
+    """As MMD rigs arrive in Blender: the sides at the end, some digits full-width."""
     bones = ("センター", "上半身", "上半身２", "首", "頭", "髪１", "腕.L", "ひじ.L", "腕.R", "ひじ.R", "下半身")
     parents = np.array([-1, 0, 1, 2, 3, 4, 2, 6, 2, 8, 0])
     miku = rig.RigArrays("Miku", bones, parents, np.broadcast_to(np.eye(4), (11, 4, 4)))
@@ -132,7 +132,7 @@ def test_bad_hair_in_plain_words(points, counts, words):
 
 
 def test_errors_name_what_the_panel_has(tmp_path):
-    """No option and no command of a terminal, whatever the chains are called."""
+    """No option or command of a terminal, whatever the names of the chains."""
     skeleton = Skeleton(BONES, PARENTS, rest())
     character = Character(skeleton, None, rig.RigArrays("Rig", BONES, PARENTS, rest()).humanoid())
     for patterns in ("", "curl*", "spine", "head"):

@@ -11,12 +11,12 @@ from dcc_addon.services.threaded import Threaded
 
 
 class _Stage:
-    """Stands for what work opens."""
+    """Stands in for what work opens."""
 
 
 @pytest.mark.parametrize("how", ["cancelled", "failed"])
 def test_what_stopped_work_had_open_is_closed_at_once(how):
-    """Not at the next garbage collection: an open stage gives whoever opens its file again what the file held before."""
+    """Not only at the next garbage collection: while a stage is open, opening its file again gives the old content."""
     opened = []
 
     def work(say):

@@ -14,7 +14,7 @@ def _answered(asked: trainers.Trainers, python: str = "python") -> str | None:
 
 
 def test_a_problem_is_asked_about_again_some_seconds_later(monkeypatch):
-    """Meanwhile the last answer stands; once it can train it is left alone."""
+    """Until then the last answer stands; a Python that can train is not asked again."""
     answers = ["it lacks torch", "it lacks warp", ""]
     asked = trainers.Trainers(lambda _: answers.pop(0))
     assert asked.known("python") is None

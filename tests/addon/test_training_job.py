@@ -65,7 +65,7 @@ def test_training_runs_beside_and_says_how_far_it_is(job):
     _wait(lambda: not running.running)
     assert running.succeeded and running.message == "half" and running.done == 0.5
     assert running.notes == ["/Hair: a", "b", "K\xfcche"]
-    running = job("number")  # a library's own word
+    running = job("number")  # a library's own output
     _wait(lambda: not running.running)
     assert running.succeeded and running.message == "more"
 
@@ -89,7 +89,7 @@ def test_training_is_cancelled_at_once(job):
 
 
 def test_what_a_cancelled_training_has_made_goes_with_it(job, tmp_path):
-    """Nothing goes on from there, and it may be gigabytes beside the artist's file."""
+    """Nothing resumes from it, and it may be gigabytes beside the artist's file."""
     running = job("wait")
     _wait(lambda: running.done == 0.5)
     made = tmp_path / "wait.training" / "rollouts"
@@ -103,7 +103,7 @@ def test_one_that_ends_before_it_has_heard_what_to_do_is_told_of(monkeypatch, tm
     child = tmp_path / "child.py"
     child.write_text("import os, sys; os.close(0); print('broken', file=sys.stderr, flush=True); os._exit(3)")
     monkeypatch.setattr(training_job, "CHILD", child)
-    long = {"out": "x", "minutes": 1, "chains": ["*" * 1_000_000]}  # more than waits in a pipe until it is read
+    long = {"out": "x", "minutes": 1, "chains": ["*" * 1_000_000]}  # more than a pipe holds until it is read
     running = training_job.TrainingJob(sys.executable, long)
     _wait(lambda: not running.running)
     assert running.failure() == "broken"
@@ -152,7 +152,7 @@ def test_a_program_that_is_no_python_cannot_train():
 
 
 def test_why_a_python_cannot_be_asked(tmp_path, monkeypatch):
-    """In words, not names of errors."""
+    """In words, not as names of errors."""
     check = tmp_path / "check.py"
     check.write_text("import time; time.sleep(60)")
     monkeypatch.setattr(training_job, "CHECK", check)
@@ -163,7 +163,7 @@ def test_why_a_python_cannot_be_asked(tmp_path, monkeypatch):
 
 
 def test_a_python_that_can_train_says_so(tmp_path, monkeypatch):
-    """Whatever libraries print as they load."""
+    """Whatever libraries print while they load."""
     modules = ("torch", "warp", "onnx", "usd", "usd.models", "usd.models.train")
     check = tmp_path / "check.py"
     given = f"import sys; sys.modules.update(dict.fromkeys({modules!r}, sys)); print('loading')\n"
@@ -173,7 +173,7 @@ def test_a_python_that_can_train_says_so(tmp_path, monkeypatch):
 
 
 def test_what_is_too_old_can_read_that_it_is():
-    """Python 2.7 has no f-strings, annotations or bytes beyond ASCII, and would tell of a syntax error."""
+    """Python 2.7 has no f-strings or annotations, takes only ASCII, and would report a syntax error."""
     source = training_job.CHECK.read_bytes().decode("ascii")
     for node in ast.walk(ast.parse(source)):
         assert not isinstance(node, (ast.JoinedStr, ast.AnnAssign, ast.NamedExpr, ast.AsyncFunctionDef, ast.Nonlocal))
@@ -197,7 +197,7 @@ def test_the_remedy_names_the_wheel_that_comes_along(tmp_path, monkeypatch):
 
 
 def test_why_a_python_cannot_train(tmp_path, monkeypatch):
-    """What is too old, what is not there, and what is there and does not load."""
+    """A version is too old, a package is missing, or is there and does not load."""
     monkeypatch.syspath_prepend(tmp_path)
     for package in ("torch", "warp"):
         monkeypatch.delitem(sys.modules, package, raising=False)

@@ -16,8 +16,8 @@ FRAMES = np.arange(12)
 
 
 def _limb(stretch: float):
-    """World transforms (12, 8, 4, 4) of an arm that IK stretches, as Stretch To does with the volume kept, and of a hand that
-    inherits none of it.
+    """World transforms (12, 8, 4, 4) of an arm that IK stretches, as Stretch To does when it keeps the volume, and of a hand that
+    inherits none of the stretch.
     """
     turns = np.cumsum(from_vector(np.random.default_rng(2).normal(size=(12, 8, 3)) * 0.5)[:, :, None], axis=2)[:, :, 0]
     world = np.tile(np.eye(4), (12, 8, 1, 1))
@@ -36,7 +36,7 @@ def _bind():
 
 @pytest.mark.parametrize("stretch", [1.3, 2.0, 6.0, 40.0])
 def test_below_a_stretched_limb_nothing_runs_away(stretch):
-    """All stay in place; what cannot keep its shape is not off by more and more down the chain."""
+    """All joints stay in place; for those that cannot keep their shape, the error does not grow down the chain."""
     world = _limb(stretch)
     made = Motion.from_world(FRAMES, 24, 1.0, PARENTS, _bind(), world, np.zeros((12, 0)), {}, head=1).world()
     assert np.abs(made[..., :3, 3] - world[..., :3, 3]).max() < 1e-4
@@ -46,7 +46,7 @@ def test_below_a_stretched_limb_nothing_runs_away(stretch):
 
 
 def test_a_mirrored_prop_keeps_nobody_from_sampling():
-    """It is where it was, with its first axis turned round; of a joint that moves hair it is told in which frame."""
+    """It stays where it was, with its first axis reversed; for a joint that moves hair, the message names the frame."""
     world, rig = _limb(1.0), RigArrays("Rig", BONES, PARENTS, _bind())
     world[5:7, 6:, :3, :3] *= -1
     world[8, 7, :3, :3] = 0

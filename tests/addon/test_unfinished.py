@@ -60,7 +60,7 @@ def _no_links(*_):
 
 
 def _put(path: Path, content: bytes) -> None:
-    """Replace a file as writers do, whole."""
+    """Replace a file as a whole, as writers do."""
     part = path.with_name("part")
     part.write_bytes(content)
     os.replace(part, path)

@@ -7,7 +7,7 @@ from dcc_addon.services.wrapping import wrapped
 
 
 def measure(text: str) -> float:
-    """Narrow and wide letters, as in a font: a letter of Japanese is twice as wide as one of Latin script."""
+    """Narrow and wide letters, as in a font: a Japanese letter is twice as wide as a Latin one."""
     return sum(0.4 if letter in "il.,: \u00a0" else 2.0 if ord(letter) > 0x2E80 else 1.0 for letter in text)
 
 

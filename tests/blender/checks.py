@@ -11,7 +11,7 @@ from tests.blender import scenes
 
 MODEL = os.environ.get("NEURALOCKS_TEST_MODEL", "")
 SAME = 1e-5
-"""Points that are nearer to each other are the same [m]."""
+"""Points nearer to each other than this [m] are the same."""
 
 
 def make_live(rig, strands, **look):
@@ -27,21 +27,21 @@ def make_live(rig, strands, **look):
 
 
 def give_bone_model(rig, folder):
-    """Sample a rig, and give its hair bones a model of random weights, which lies in the folder."""
+    """Sample a rig, and give its hair bones a model of random weights, stored in the folder."""
     bpy.context.scene.neuralocks.armature = rig
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
 
 
 def messages():
-    """What the panel says is wrong, by object name."""
+    """The problems that the panel shows, by object name."""
     from dcc_addon.session import session
 
     return session.messages
 
 
 def refused(call, *words):
-    """The call raises an error that has all these words, as operators do that refuse, and no unexpected one."""
+    """The call raises an error with all these words, as operators that refuse do, and not an unexpected one."""
     try:
         result = call()
     except Exception as error:
@@ -53,7 +53,7 @@ def refused(call, *words):
 
 
 def needs_usd():
-    """Ends the scenario where this Blender was built without USD, as Debian's is."""
+    """Ends the scenario if this Blender was built without USD, as Debian's is."""
     if not getattr(bpy.app.build_options, "usd", False):
         raise SkipTest("no USD in this Blender")
 
@@ -65,7 +65,7 @@ def points_at(strands, frame, subframe=0.0):
 
 
 def bones_at(rig, frame, names=None):
-    """Matrices (J, 4, 4) of the bones of these names, else of all, at a frame, as they are drawn, in the rig's space."""
+    """Matrices (J, 4, 4) of the bones of these names, or of all, at a frame, as they are drawn, in the rig's space."""
     bpy.context.scene.frame_set(frame)
     pose = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose
     return np.array([np.array(bone.matrix) for bone in pose.bones if names is None or bone.name in names])
@@ -83,7 +83,7 @@ def baked_points(path, prim, frame):
 
 
 def apart(a, b):
-    """Largest difference of two arrays of one shape."""
+    """Largest difference of two arrays of the same shape."""
     assert a.shape == b.shape
     return float(np.abs(a - b).max())
 

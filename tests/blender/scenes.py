@@ -120,7 +120,7 @@ def dance(rig, frames=(1, 24)) -> None:
 
 
 def collect(name: str) -> None:
-    """Put all that is in the scene into a collection of its own."""
+    """Put everything in the scene into its own collection."""
     top, own = bpy.context.scene.collection, bpy.data.collections.new(name)
     top.children.link(own)
     for thing in list(top.objects):
@@ -168,7 +168,7 @@ def fcurves_of(action) -> list:
 
 
 def rig_model(rig, path):
-    """A model of random weights for the hair bones of a rig; its graph, for which onnx is needed, is none that anybody reads."""
+    """A model of random weights for the hair bones of a rig; its graph, for which onnx is needed, is never read."""
     from dcc_addon.services.bones import chains_of
     from dcc_addon.session import session
     from neuralocks_core.rig import rig_spec

@@ -32,7 +32,7 @@ def _wanted() -> list[str]:
 
 
 def _command(version: str) -> list[str]:
-    """How to run a script in this Blender; skips where it is not installed."""
+    """How to run a script in this Blender; skips if it is not installed."""
     script = str(HERE / "run.py")
     if version == WINDOWED:
         if not shutil.which("blender"):
@@ -60,11 +60,11 @@ class _Blender:
             )
 
     def run(self, scenario: str, folder: Path) -> str:
-        """Empty where the scenario holds; else what went wrong. Raises pytest's skip where this Blender cannot do it."""
+        """Empty if the scenario holds, otherwise what went wrong. Raises pytest's skip if this Blender cannot do it."""
         self.scenarios.append(scenario)
         begun, limit = self.log.stat().st_size, SLOW.get(scenario, LIMIT)
         until = time.monotonic() + limit
-        with contextlib.suppress(OSError):  # where it has ended, its status says so
+        with contextlib.suppress(OSError):  # if it has ended, its status says so
             print(scenario, folder, sep="\t", file=self.process.stdin, flush=True)
         while time.monotonic() < until:
             gone = self.process.poll()
@@ -82,7 +82,7 @@ class _Blender:
         return f"did not end within {limit} s"
 
     def leave(self) -> None:
-        """End it, whatever it does."""
+        """End it, whatever it is doing."""
         self.process.kill()
         self.process.communicate()
 

@@ -16,7 +16,7 @@ import numpy as np  # noqa: E402
 
 FOLDER = Path(sys.argv[-1])
 TAB, LIVE = 130, 318
-"""How far below the top of the sidebar the third tab and the Live button lie."""
+"""How far below the top of the sidebar the third tab and the Live button are."""
 state = {}
 
 
@@ -64,7 +64,7 @@ def mouse(below=None, click=False):
 
 
 def is_live():
-    """The click on Live has reached the hair, and sampling goes on in the background."""
+    """The click on Live has reached the hair, and sampling runs in the background."""
     assert bpy.data.objects["Hair"].neuralocks_hair.live, "the click on Live has not arrived"
 
 
@@ -117,7 +117,7 @@ STEPS = [build, _idle, mouse, lambda: mouse(click=True), lambda: mouse(TAB), lam
 
 
 def tick():
-    """Do the next step; leave hard, for a window has nobody to close it."""
+    """Do the next step; exit hard, because nobody closes the window."""
     try:
         STEPS.pop(0)()
     except Exception:

@@ -10,7 +10,7 @@ ENGINE = "WITNESS"
 
 @contextmanager
 def witness(look):
-    """While it lasts there is the render engine ENGINE, that calls look(engine, graph) for each view layer that it renders."""
+    """In this block, there is the render engine ENGINE, which calls look(engine, graph) for each view layer that it renders."""
 
     class Witness(bpy.types.RenderEngine):
         bl_idname, bl_label = ENGINE, "Witness"

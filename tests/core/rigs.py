@@ -22,7 +22,7 @@ def bind() -> np.ndarray:
 
 
 def person(turn: np.ndarray | None = None) -> Character:
-    """The humanoid, standing as it is or turned as a whole by a rotation (3, 3)."""
+    """The humanoid, as it is or turned as a whole by a rotation (3, 3)."""
     transforms = bind()
     if turn is not None:
         whole = np.eye(4)

@@ -39,13 +39,13 @@ def test_constant_speed_is_no_motion():
 
 
 def turning(rate):
-    """A turn about the world's y axis at so many rad/s."""
+    """A turn about the world's y axis at `rate` rad/s."""
     return lambda t: rotation.from_vector(np.outer(rate * t, [0, 1, 0]))
 
 
 def test_spin_is_read_in_head_axes():
-    """A head that is bent by 0.7 rad about its x axis has the world's y axis at (0, cos 0.7, -sin 0.7), also where it is turned
-    by half a round, past which its quaternion has the other sign.
+    """A head that is bent by 0.7 rad about its x axis has the world's y axis at (0, cos 0.7, -sin 0.7), also if it is turned by
+    half a round, past which its quaternion has the other sign.
     """
     clip = moved(np.arange(90) / 30, None, lambda t: turning(2.0)(t) @ rotation.from_vector([0.7, 0, 0]))
     assert history(BoundarySampler(SPEC, person(), clip).vectors([2.01]))[0, :, 3:6] == pytest.approx(
@@ -54,7 +54,7 @@ def test_spin_is_read_in_head_axes():
 
 
 def test_a_turn_beyond_what_was_learned_is_cut_off():
-    """Sampled finely, or it would be taken for a slower turn the other way."""
+    """It is sampled finely, or it would be taken for a slower turn the other way."""
     clip = moved(np.arange(0, 2, 1 / 240), None, turning(60.0))
     assert history(BoundarySampler(SPEC, person(), clip).vectors([1.5]))[0, :, 3:6] == pytest.approx(
         np.tile([0, BoundarySampler.SPIN_LIMIT, 0], (30, 1)), abs=1e-4
@@ -73,7 +73,7 @@ def test_frame_rates_agree(rate):
 
 
 def test_what_is_read_of_hair_on_a_joint_below_the_head_is_the_heads_as_that_joint_has_it():
-    """A jaw that stands still against the head changes nothing, one that turns little changes little."""
+    """A jaw that does not move relative to the head changes nothing; one that turns little changes little."""
     jaw, times = [0.0, -0.05, 0.08], np.arange(0, 2, 1 / 24)
     plain = moved(times, lambda t: np.stack([0.2 * np.sin(5 * t), 0 * t, 0 * t], -1), swing)
     skeleton = person().skeleton
@@ -129,7 +129,7 @@ def test_the_bind_pose_held_is_the_anchor():
 
 
 def test_arms_bound_down_read_as_arms_bound_out():
-    """One held pose of one character, bound in T-pose and with its arms 50 degrees down: an arm's turn is told from T-pose."""
+    """One held pose of one character, bound in T-pose and with its arms 50 degrees down: an arm's turn is measured from T-pose."""
     t_pose, down, held = with_elbows(), np.radians(50.0), rotation.from_vector([0.3, 0.2, -0.6])
     bound, posed = [t_pose.skeleton.bind.copy() for _ in range(2)], []
     lowered = {side: rotation.from_vector([0, 0, -sign * down]) for side, sign in (("left", 1), ("right", -1))}
@@ -162,7 +162,7 @@ def test_one_time_or_many_give_the_same_bits():
 
 @pytest.mark.parametrize("sway", [0.1, 0.0])
 def test_a_loop_has_no_seam(sway):
-    """Also one in which somebody walks: it goes on from where it has come to, and at constant speed nothing is felt."""
+    """Also one with a walk: it continues from where it has come to, and at constant speed nothing is felt."""
     times = np.linspace(0, 2, 49)
     clip = moved(times, lambda t: np.stack([1.5 * t + sway * np.sin(np.pi * t), 0 * t, 0 * t], -1), loop=True)
     sampler = BoundarySampler(SPEC, person(), clip)
@@ -201,7 +201,7 @@ def test_a_cut_counts_from_its_own_sample_on_however_its_time_was_rounded():
 
 @pytest.mark.parametrize(("linear", "limit"), [("gravity", "GRAVITY_LIMIT"), ("velocity", "SPEED_LIMIT")])
 def test_a_leap_within_a_loop_is_bounded(linear, limit):
-    """A loop has no cuts, and its path stays as it is, or its seam would not fit: what is felt of a leap is cut off."""
+    """A loop has no cuts, and its path stays as it is, or its seam would not fit: what is felt of a jump is limited."""
     spec = BoundarySpec(bins=(1,) * 30, taper=0.0, linear=linear)
     clip = moved(
         np.arange(49) / 24, lambda t: np.stack([40.0 * np.exp(-400 * (t - 1) ** 2), 0 * t, 0 * t], -1), loop=True
@@ -220,8 +220,8 @@ def test_a_teleport_is_bounded():
 
 @pytest.mark.parametrize("rate", [24, 30, 60, 144])
 def test_a_sudden_start_is_felt_alike_in_all_frames_after_it(rate):
-    """At 4 m/s from one frame to the next: limited step by step alone, twice as much was passed on in each second frame of 60 a
-    second, in which two steps shared the blow.
+    """At 4 m/s from one frame to the next: with a limit per step alone, twice as much was passed on in every second frame at 60
+    fps, where two steps shared the blow.
     """
     times = np.arange(0, 2, 1 / rate)
     path = moved(times, lambda t: np.stack([4.0 * np.maximum(t - 0.5, 0), 0 * t, 0 * t], -1))

@@ -59,7 +59,7 @@ def test_arrays_that_find_no_room_leave_those_that_were_there(tmp_path):
 
 
 class _Windows:
-    """Refuses, as Windows does, to replace or remove files that a program shows; to rename them it allows."""
+    """Refuses, as Windows does, to replace or remove files that a program has mapped, but allows renaming them."""
 
     def __init__(self, monkeypatch, shown: Path):
         self._shown, self._identity = shown, shown.stat().st_ino
@@ -94,7 +94,7 @@ def test_a_file_that_windows_does_not_replace_steps_aside(tmp_path, monkeypatch)
         (aside,) = (other for other in tmp_path.iterdir() if other != path)
         assert aside.read_bytes() == b"old" and aside.name.startswith(".hair.usdc.")
     with monkeypatch.context() as patch:
-        _Windows(patch, path)  # the one before is not shown any more
+        _Windows(patch, path)  # the previous one is no longer mapped
         with atomic_write(path) as part:
             part.write_bytes(b"last")
         assert path.read_bytes() == b"last" and len(list(tmp_path.iterdir())) == 2 and not aside.exists()

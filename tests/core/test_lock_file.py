@@ -8,7 +8,7 @@ from neuralocks_core.lock_file import FolderLock
 
 
 def test_second_is_refused(tmp_path):
-    """While it is held, and not afterwards; what is in it stays, and an empty one goes."""
+    """While it is held, and not afterwards; the folder's content stays, and an empty folder is removed."""
     folder = tmp_path / "work"
     first = FolderLock(folder, folder, "busy")
     (folder / "kept").touch()
@@ -23,7 +23,7 @@ def test_second_is_refused(tmp_path):
 
 
 def test_removed_while_it_is_opened(tmp_path, monkeypatch):
-    """Who waits at the door while the folder is removed holds the one that is made anew, not the one that is gone."""
+    """A process that waits while the folder is removed holds the recreated one, not the one that is gone."""
     folder = tmp_path / "work"
     first = FolderLock(folder, folder, "busy")
     fcntl = pytest.importorskip("fcntl")
@@ -42,7 +42,7 @@ def test_removed_while_it_is_opened(tmp_path, monkeypatch):
 
 
 def test_no_folder_can_be_made(tmp_path):
-    """The message names what the caller is about."""
+    """The message names what the caller is doing."""
     (tmp_path / "file").touch()
     with pytest.raises(NeuralocksError, match="hair.usdc"):
         FolderLock(tmp_path / "file", tmp_path / "hair.usdc", "busy")

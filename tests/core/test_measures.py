@@ -31,7 +31,7 @@ def _ball(centre, size, joint):
 
 
 def _cards():
-    """A sheet behind the head that goes on into the neck."""
+    """A sheet behind the head that continues into the neck."""
     x, y = np.meshgrid(np.linspace(-0.1, 0.1, 9), np.linspace(1.3, 1.75, 16))
     corner = (np.arange(8) + 9 * np.arange(15)[:, None]).reshape(-1, 1)
     points = np.stack([x, y, 0 * x - 0.3], axis=-1).reshape(-1, 3)
@@ -55,12 +55,12 @@ def _dressed(*pieces, shapes=None) -> Character:
 
 
 def _split(points, faces, joints):
-    """Every face with points of its own, as files part a skin along seams."""
+    """Every face with its own points, as files split a skin along seams."""
     return points[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3), joints[faces].reshape(-1)
 
 
 def _two_meshes(points, faces, joints):
-    """Head and trunk, either bound to one joint alone."""
+    """Head and trunk, each bound to a single joint."""
     upper = (joints[faces] == HEAD).all(axis=1)
     parts = [(points, faces[upper], np.full(len(points), HEAD)), (points, faces[~upper], np.minimum(joints, NECK))]
     kept = [np.unique(faces) for _, faces, _ in parts]
@@ -78,7 +78,7 @@ def test_what_is_worn_is_no_part_of_head_or_back(skin, worn):
 
 
 def test_an_elfs_ears_do_not_lower_the_middle_of_its_head():
-    """They are skin, and stand above half of its height: hair was grown on the shoulders."""
+    """They are skin, above half of the head's height: hair would grow on the shoulders."""
     points, faces, joints = _skin()
     ear = (np.abs(points[:, 0]) > 0.07) & (points[:, 1] > 1.68)
     elf = points + np.where(ear, np.sign(points[:, 0]) * 0.2, 0)[:, None] * [1, 0, 0]
@@ -89,7 +89,7 @@ def test_an_elfs_ears_do_not_lower_the_middle_of_its_head():
 
 @pytest.mark.parametrize("worn", WORN)
 def test_where_skin_cannot_be_told_every_mesh_counts(worn):
-    """A head that hangs together with nothing may be a hat as well."""
+    """A head that is connected to nothing may as well be a hat."""
     head, trunk = _ball([0, 1.68, 0.02], 0.1, HEAD), _ball([0, 1.3, 0], 0.15, SPINE)
     assert _dressed(head, trunk).skin.all() and _dressed(head, trunk, WORN[worn]).skin.all()
 
@@ -125,7 +125,7 @@ def test_shapes_of_the_face_do_not_count_and_those_of_the_body_do():
 
 
 def test_a_body_that_changes_in_time_is_measured_as_it_is_then():
-    """A head that grows a tenth wider while the clip lasts."""
+    """A head that grows a tenth wider during the clip."""
     head = _ball(POSITIONS[HEAD] + [0, 0.02, 0], [0.085, 0.13, 0.104], HEAD)
     pieces = head, _ball([0, 1.3, 0], 0.11, SPINE)
     wider = np.concatenate([points for points, _, _ in pieces]) * [0.1, 0, 0]
@@ -161,7 +161,7 @@ def test_a_network_reads_no_more_than_it_learned():
 
 
 def test_what_is_not_known_is_the_middle_of_what_was_learned():
-    """At a corner of it hair of a head without skin moved otherwise than on any trained body."""
+    """At a corner of the learned range, hair of a head without skin moved unlike that on any trained body."""
     bounded = np.isfinite(LOWEST)
     low, high = LOWEST[bounded], HIGHEST[bounded]
     assert (np.abs(AVERAGE[bounded] - (low + high) / 2) < 0.05 * (high - low)).all()

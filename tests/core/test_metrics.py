@@ -14,7 +14,7 @@ LENGTH = np.array([0.3, 0.5])
 
 
 def swinging(amplitude=0.05, frequency=1.0, decay=0.0, phase=0.0):
-    """Two straight strands along -Y whose vertices swing along X in proportion to their place."""
+    """Two straight strands along -Y whose vertices swing along X in proportion to their position."""
     place = np.linspace(0, 1, 24)
     rest = np.zeros((2, 24, 3))
     rest[:, :, 1] = -place * LENGTH[:, None]
@@ -70,7 +70,7 @@ def test_a_strand_that_rests_elsewhere_moves_the_rms_more_than_the_median():
 
 
 def test_of_a_reference_without_motion_nothing_is_relative():
-    """Fur moves by less than what single precision stores: its card said 1.5 times the error, 75 % of the motion."""
+    """Fur moves by less than single precision resolves: without this, its card says 1.5 times the error, 75 % of the motion."""
     reference, rest = swinging(amplitude=1e-6)
     noise = rest + np.random.default_rng(0).normal(size=reference.shape) * 1e-6
     assert np.isnan(metrics.velocity_error(noise, reference, TIMES))
@@ -91,7 +91,7 @@ def test_dynamic_frames_counts_the_longest_run():
 
 
 def test_dynamic_frames_are_samples_and_the_card_says_so():
-    """A shot's frame may have several."""
+    """A shot's frame may have several samples."""
     reference, _ = swinging()
     assert metrics.dynamic_frames(reference[::2], reference[::2], TIMES[::2]) <= len(TIMES) // 2
     assert "samples" in LABELS["dynamic_frames"][0]
@@ -113,7 +113,7 @@ def test_what_stops_at_once_has_settled_at_its_last_moving_sample():
 
 
 def test_what_creeps_on_slower_than_still_has_settled():
-    """Even where that is more than a tenth of a slow motion."""
+    """Even if that is more than a tenth of a slow motion."""
     points = np.zeros((len(TIMES), 1, 24, 3))
     points[:, 0, :, 0] = np.where(TIMES < 0.5, 0.05 * TIMES, 0.025 + 0.008 * (TIMES - 0.5))[:, None]
     assert metrics.settling_time(points, TIMES, stop=0.0) == 0.5
@@ -121,7 +121,7 @@ def test_what_creeps_on_slower_than_still_has_settled():
 
 @pytest.mark.parametrize("rate", [12, 24, 384, 1536])
 def test_a_held_pose_is_the_same_however_often_it_is_sampled(rate):
-    """Breathing moves a head by some mm/s: 64 samples a frame of it are no stop, nor is what rounding does to a pose motion."""
+    """Breathing moves a head by some mm/s: 64 samples per frame of it are not a stop, and rounding of a pose is not motion."""
     times = np.arange(0, 2, 1 / rate)
     joints = np.tile(np.eye(4), (len(times), 2, 1, 1))
     joints[:, 1, 1, 3] = 5.0 + 0.003 * times * (times < 1)
@@ -130,7 +130,7 @@ def test_a_held_pose_is_the_same_however_often_it_is_sampled(rate):
 
 
 def test_echo_of_a_decaying_swing():
-    """Speed falls as exp(-3 t), a swing's mean speed is 2 / pi of its peak; nothing that stands echoes."""
+    """Speed falls as exp(-3 t), a swing's mean speed is 2 / pi of its peak; still hair has no echo."""
     points, _ = swinging(amplitude=0.2, frequency=4, decay=3)
     mean = (np.exp(-1.5) - np.exp(-6)) / (3 * 1.5)
     assert metrics.echo(points, points, TIMES, stop=0.0) == pytest.approx(100 * mean * 2 / np.pi, rel=0.15)

@@ -66,7 +66,7 @@ def test_what_unpacks_to_more_than_it_claims_is_unpacked_as_far_as_that(tmp_path
 
 @pytest.mark.parametrize("packed", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_damage_is_told_in_one_line_however_a_file_is_packed(tmp_path, packed):
-    """Each way to pack entries has errors of its own."""
+    """Each way to pack entries has its own errors."""
     with zipfile.ZipFile(PATH) as old, zipfile.ZipFile(tmp_path / "m.neuralocks", "w", packed) as new:
         for name in old.namelist():
             new.writestr(name, old.read(name))

@@ -20,7 +20,7 @@ def test_quaternions_and_vectors_agree_with_matrices():
 
 @pytest.mark.parametrize("axis", np.eye(3))
 def test_opposite_directions_are_half_a_turn_apart(axis):
-    """About any axis across; the cross product with a fixed one vanishes for some."""
+    """About any perpendicular axis; the cross product with a fixed axis vanishes for some."""
     np.testing.assert_allclose(rotation.between(axis, -axis) @ axis, -axis, atol=1e-12)
 
 

@@ -102,8 +102,8 @@ def test_the_held_bind_pose_is_exactly_the_groom(path, strands):
 
 
 def test_clumping_draws_the_hairs_of_a_lock_together(path, strands):
-    """How far they stray follows their own factors; the lock's own way does not change, the held bind pose is the
-    groom whatever the clumping, and lengths are kept."""
+    """How far they stray follows their own factors; the lock's own path does not change, the held bind pose is the groom whatever
+    the clumping, and lengths are kept."""
     if path.stem == "displacement":
         pytest.skip("hair that stretches has no lengths to keep")
     rng = np.random.default_rng(5)
@@ -134,7 +134,7 @@ def test_clumping_draws_the_hairs_of_a_lock_together(path, strands):
 
 
 def test_a_little_clumping_changes_little(path, strands):
-    """Of hair that the network stretches, too: its lengths are the network's, not those at rest."""
+    """Also for hair that the network stretches: its lengths are the network's, not those at rest."""
     vector = (0.3 * np.random.default_rng(6).normal(size=SPEC.size)).astype(np.float32)
     session, moved = StrandSession(StrandModel.load(path), strands), []
     for ratio in (0.0, 1e-5):
@@ -228,7 +228,7 @@ def test_a_graph_that_fails_while_it_is_computed_is_one_line(path, strands, tmp_
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
 @pytest.mark.parametrize("name", model.KINDS["strands"])
 def test_a_model_that_gives_no_finite_hair_is_refused(path, strands, tmp_path, name, value):
-    """Such weights would fill a bake with NaN, and nothing else tells."""
+    """Such weights would fill a bake with NaN, and nothing else reports it."""
     onnx = pytest.importorskip("onnx")
     file = model.read(path)
     graph = onnx.load_model_from_string(file.graphs[name])
@@ -257,7 +257,7 @@ def test_the_runtime_imports_without_torch_usd_or_blender():
 
 
 def test_nothing_is_reported_and_nothing_kept_in_the_home_folder(tmp_path):
-    """Left to itself, onnxruntime tells its maker what was run, from a database and an identifier that it puts there."""
+    """By default, onnxruntime reports to its maker what was run, from a database and an identifier that it puts there."""
     code = (
         "from neuralocks_core import model\n"
         "from neuralocks_core.runtime import graph_session\n"

@@ -15,7 +15,7 @@ TIMES = np.arange(25) / 24
 
 
 def clip(loop=False):
-    """The body goes forward and bobs, the head shakes; a whole number of times in the clip."""
+    """The body goes forward and bobs, the head shakes; a whole number of cycles in the clip."""
     turn = 2 * np.pi * TIMES / TIMES[-1]
     joints = np.tile(rigs.bind(), (len(TIMES), 1, 1, 1))
     joints[:, :, 0, 3] += 0.3 * TIMES[:, None] + 0.05 * np.sin(turn)[:, None]

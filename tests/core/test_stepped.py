@@ -31,7 +31,7 @@ def walk(times, speed=1.5):
 
 
 def shown(frames, rate=24, **options):
-    """The walk at `rate` frames a second, of which each shows the pose of one of `frames`."""
+    """The walk at `rate` frames per second, each showing the pose of one of `frames`."""
     return Clip(np.arange(len(frames)) / rate, walk(np.arange(max(frames) + 1) / rate, **options).joints[frames])
 
 
@@ -49,7 +49,7 @@ def test_hair_moves_as_through_the_distinct_poses_and_holds_with_them(held):
 
 
 def test_far_from_the_origin_poses_are_told_apart_by_their_turns():
-    """Where places are rounded most, a nod of a few degrees is still none."""
+    """Where positions are rounded most, a nod of a few degrees is still not a held pose."""
     clip = shown(FRAMES - FRAMES % 2, speed=0.0)
     far = clip.joints.copy()
     far[:, :, 0, 3] += 1e4
@@ -57,7 +57,7 @@ def test_far_from_the_origin_poses_are_told_apart_by_their_turns():
 
 
 def test_between_frames_the_motion_goes_from_pose_to_pose_as_they_are_drawn():
-    """USD draws the chord from a held frame to the next pose; so far hair is on its way."""
+    """USD draws the chord from a held frame to the next pose; hair is that far on its way."""
     first = FRAMES - FRAMES % 2
     np.testing.assert_allclose(
         vectors(shown(first), [20.5, 21.5, 21.75]), vectors(walk(np.unique(first) / 24), [20, 21, 21.5]), atol=1e-2
@@ -72,7 +72,7 @@ def test_poses_may_be_held_for_a_part_of_the_clip_and_for_one_frame_or_three():
 
 
 def test_a_stop_is_a_stop():
-    """Half a second; the last frame before the walk goes on is of the pose that is held for two."""
+    """Half a second; the last frame before the walk continues belongs to the pose that is held for two."""
     frames = np.concatenate([FRAMES[:12] - FRAMES[:12] % 2, STOP, 14 + FRAMES[:24] - FRAMES[:24] % 2])
     stepped = Stepped.of(shown(frames), [HEAD])
     np.testing.assert_allclose(stepped.clip.times * 24, [*range(0, 12, 2), *range(12, 23), *range(24, 48, 2)])
@@ -86,7 +86,7 @@ def test_a_stop_is_a_stop():
     [
         FRAMES,
         [*range(12), *STOP, *range(13, 36)],
-        [0, 1, 2, 3, 3, 4, 5, 6, 7, 8, 8, 9, 10, 11, 12, 13, 13, 14, 15, 16],  # a sample that was lost here and there
+        [0, 1, 2, 3, 3, 4, 5, 6, 7, 8, 8, 9, 10, 11, 12, 13, 13, 14, 15, 16],  # some lost samples
         [0, 1, 2, 3, 3, 3, 3, 4, 5, 6, 7, 7, 7, 7, 8, 9, 10, 11, 11, 11, 11, 12],  # pauses of a robot
         FRAMES - FRAMES % 8,
         0 * FRAMES,

@@ -11,7 +11,7 @@ TRIANGLE = np.float32([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]])
 
 
 def avatar(path, seconds=1.0):
-    """Write it; the head turns by 30 degrees in so many seconds."""
+    """Write it; the head turns by 30 degrees in `seconds`."""
     nodes = [
         {"name": "Hips", "translation": [0, 1, 0], "children": [1]},
         {"name": "Head", "translation": [0, 0.5, 0], "children": [2, 4, 6]},
@@ -24,7 +24,7 @@ def avatar(path, seconds=1.0):
     ]
     places = {0: [0, 1, 0], 1: [0, 1.5, 0], 2: [0.1, 1.5, 0], 3: [0.1, 1.4, 0], 4: [-0.1, 1.5, 0], 5: [-0.1, 1.4, 0]}
     binds = np.tile(np.eye(4, dtype=np.float32), (6, 1, 1))
-    binds[:, 3, :3] = [[-x for x in places[joint]] for joint in range(6)]  # of the columns that glTF has
+    binds[:, 3, :3] = [[-x for x in places[joint]] for joint in range(6)]  # in columns, as glTF stores them
     arrays = [
         ("VEC3", np.concatenate([TRIANGLE + np.float32(places[joint]) for joint in range(6)])),
         ("VEC4", np.repeat(np.uint16([[joint, 0, 0, 0] for joint in range(6)]), 3, axis=0)),

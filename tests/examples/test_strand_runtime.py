@@ -18,7 +18,7 @@ from usd.models.export import export_model
 
 @pytest.fixture
 def shot(tmp_path):
-    """A turned character that was moved away, with straight hair of 24 vertices."""
+    """A turned and moved character with straight hair of 24 vertices."""
     turned = np.array([[0.0, 0, 1, 3], [0, 1, 0, 0.5], [-1, 0, 0, -2], [0, 0, 0, 1]])
     path = write_shot(tmp_path, Recipe(frames=40, vertices=2, strands=60, place=turned))
     stage = Usd.Stage.Open(str(path))
@@ -81,7 +81,7 @@ def test_it_has_it_too_of_models_of_other_kinds(tmp_path, shot, spec, settings):
 
 @pytest.mark.parametrize("wider", [2, 6])
 def test_it_has_it_too_where_the_shot_is_longer_than_its_animation_and_between_samples(tmp_path, shot, wider):
-    """Two frames before the samples are no stand, six are one."""
+    """Two frames before the samples do not count as standing still, six do."""
     stage = Usd.Stage.Open(str(shot))
     stage.SetStartTimeCode(1 - wider)
     stage.SetEndTimeCode(40 + wider)

@@ -33,7 +33,7 @@ def names(extensions, nodes=NODES) -> list[str]:
 
 
 def test_chains_are_named_by_both_versions():
-    """Only those below the head, by the first joint of each, with or without a holder, in the letters that USD has."""
+    """Only those below the head, by the first joint of each, with or without a holder, in letters that USD allows."""
     old = {
         "humanoid": {"humanBones": [{"bone": "head", "node": 0}]},
         "secondaryAnimation": {"boneGroups": [{"bones": [1, 3]}, {"bones": [4, 6]}]},
@@ -48,7 +48,7 @@ def test_chains_are_named_by_both_versions():
 
 
 def test_equal_names_and_none_are_told_apart():
-    """In names that USD takes as they are."""
+    """In names that USD accepts as they are."""
     nodes = [{"children": [1, 2, 3, 4]}, {"name": "a b"}, {"name": "a b"}, {"name": "a_b"}, {"name": "1"}]
     springs = [{"joints": [{"node": node}]} for node in range(1, 5)]
     head = {"humanoid": {"humanBones": {"head": {"node": 0}}}}
@@ -57,7 +57,7 @@ def test_equal_names_and_none_are_told_apart():
 
 
 def test_long_names_are_cut_to_what_blender_takes():
-    """At a letter, and told apart after that: a chain is printed by the name that its joint has."""
+    """At a letter boundary, and made unique after that: a chain is printed by the name that its joint has."""
     stem, kana = "Hair_" + 58 * "a", "前" * 22
     nodes = [{"name": "Head", "children": [1, 2, 3]}, {"name": stem + "_A"}, {"name": stem + "_B"}, {"name": kana}]
     springs = [{"joints": [{"node": node}]} for node in (1, 2, 3)]
@@ -74,7 +74,7 @@ def test_what_is_no_binary_gltf_is_refused(tmp_path):
 
 @pytest.mark.parametrize("fps", [30, 24])
 def test_an_avatar_comes_with_its_motion_and_what_it_wears(tmp_path, fps):
-    """Chains of equal names are found as they are printed; what Blender draws bones with stays away."""
+    """Chains of equal names are found as they are printed; the meshes that Blender draws bones with are left out."""
     blender = next(iter(installed()), None)
     if blender is None:
         pytest.skip("needs Blender as a Python module (make blender)")

@@ -14,5 +14,5 @@ def model(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def still_model(tmp_path_factory):
-    """Path of a model that never moves hair against the head."""
+    """Path of a model that never moves hair relative to the head."""
     return write_random_model(tmp_path_factory.mktemp("model") / "still.neuralocks", gain=0.0)

@@ -36,7 +36,7 @@ def write_character(path, joints: int, prefix: str = "rig_"):
             parents.append(body - 1 if up < 0 else first + up)
             if up < 0:
                 places.append(np.array([0, 1.68, 0]) + 0.11 * out)
-            else:  # the second arm of a fork leaves aside
+            else:  # the second arm of a fork turns aside
                 aside = 0.03 * np.cross(out, [0, 1, 0]) if i - up > 1 else 0
                 places.append(places[first + up] + np.array([0, -0.06, 0]) + 0.01 * out + aside)
         moving += len(set(layout) - {-1})

@@ -33,8 +33,8 @@ def small_shot(
     mirrored=6,
 ) -> Path:
     """A head with one tail of three joints and an end, nodding; in any unit and up axis, with the hair's axes turned by
-    `orient` (3, 3), its joints `step` [m] below each other. Joint `mirrored` and what hangs from it have a negative scale,
-    which moves nothing: in the bind pose, at rest and in the animation.
+    `orient` (3, 3), its joints `step` [m] below each other. Joint `mirrored` and those below it have a negative scale, which moves
+    nothing, in the bind pose, at rest and in the animation.
     """
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1 / scale)

@@ -96,7 +96,7 @@ def edited(folder: Path, edit, recipe: Recipe = Recipe()) -> Path:
 
 
 def write_loop(folder: Path) -> Path:
-    """Write a shot of six strands on a head that shakes once in 12 frames and is in the 13th as in the first."""
+    """Write a shot of six strands on a head that shakes once in 12 frames, with the 13th frame like the first."""
     path = write_shot(folder, Recipe(frames=13, strands=6), "loop")
     stage = Usd.Stage.Open(str(path))
     animation = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
@@ -131,7 +131,7 @@ def add_curves(stage, path: str, points: np.ndarray) -> None:
 
 
 def _matrix(to_stage: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """A joint's stage-space transform: a plain rotation into stage axes, and its place."""
+    """A joint's stage-space transform: a plain rotation to stage axes, and its place."""
     matrix = np.eye(4)
     matrix[:3, :3] = to_stage[:3, :3] / np.cbrt(np.linalg.det(to_stage[:3, :3]))
     matrix[:3, 3] = to_stage[:3, :3] @ position

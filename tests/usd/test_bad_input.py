@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong arguments, damaged files and full disks give one line that names the file or argument, and leave nothing behind; what
-is only odd is baked, and told.
+"""Wrong arguments, damaged files and full disks give one line that names the file or argument, and leave nothing behind; what is
+only odd is baked, with a note.
 """
 
 import numpy as np
@@ -108,7 +108,7 @@ def test_values_that_cannot_be_unpacked_are_said_so(tmp_path, model):
 
 
 def test_bytes_that_are_no_text_are_said_so(tmp_path, model):
-    """USD quotes them in its errors, and gives them for names that lie in a crate file."""
+    """USD quotes them in its errors, and returns them for names in a crate file."""
     text, crate = write_shot(tmp_path), tmp_path / "latin.usdc"
     Sdf.Layer.FindOrOpen(str(text)).Export(str(crate))
     latin, above = tmp_path / "latin.usda", tmp_path / "above.usda"
@@ -126,7 +126,7 @@ def test_bytes_that_are_no_text_are_said_so(tmp_path, model):
 
 
 def test_a_primvar_that_cannot_be_unpacked_is_said_of_the_file_that_is_imported(tmp_path):
-    """It opens, and most of it are the numbers of one primvar."""
+    """It opens, and most of it is the numbers of one primvar."""
     path, rng = write_shot(tmp_path, Recipe(extension="usdc")), np.random.default_rng(0)
     stage = Usd.Stage.Open(str(path))
     primvar = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath(HAIR)).CreatePrimvar("groom_x", Sdf.ValueTypeNames.IntArray)

@@ -62,7 +62,7 @@ def assign(index, value):
 
 
 def retyped(path, name, kind):
-    """An edit that declares an attribute with another type, as whoever misreads a schema may."""
+    """An edit that declares an attribute with another type, as may happen when a schema is misread."""
 
     def edit(stage):
         layer, target = stage.GetRootLayer(), Sdf.ValueTypeNames.Find(kind)
@@ -153,7 +153,7 @@ def test_a_stage_without_anything_lacks_skeleton_and_groom_whatever_it_is_called
 
 
 def test_a_groom_alone_is_told_to_be_put_on_its_character(tmp_path, model):
-    """As `neuralocks import` writes it; and where it misses a layer, that is the cause."""
+    """As `neuralocks import` writes it; and if a layer is missing, that is named as the cause."""
     shot = write_shot(tmp_path)
     stage = Usd.Stage.Open(str(shot))
     stage.RemovePrim(RIG)
@@ -170,7 +170,7 @@ def test_a_groom_alone_is_told_to_be_put_on_its_character(tmp_path, model):
 
 
 def test_where_a_character_stands_that_cannot_be_used_stops_nothing_more(tmp_path):
-    """Ten kilometres out by a transform, which a usable one bakes at."""
+    """It is ten kilometres out by a transform, where a usable one can be baked."""
     shot = write_shot(tmp_path)
     stage = Usd.Stage.Open(str(shot))
     UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddTranslateOp().Set((12000, 0, 0))
@@ -191,7 +191,7 @@ def test_a_rig_without_a_head_can_be_helped_by_hand(tmp_path, model):
     "made_of", ["(\n    subLayers = [@./groom.usda@]\n)", 'def "Hero" (\n    references = @./groom.usda@\n)\n{\n}']
 )
 def test_a_shot_that_came_without_its_layers_is_told_so(tmp_path, model, made_of):
-    """Copied away from the layers that it is made of, a shot was said to need a groom."""
+    """For a shot copied away from its layers, the message must not be that it needs a groom."""
     path = tmp_path / "shot.usda"
     path.write_text(f"#usda 1.0\n{made_of}\n")
     for work in (lambda: bake(path, tmp_path / "a.usdc", model), lambda: bake_rig(path, tmp_path / "b.usda")):

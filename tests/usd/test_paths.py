@@ -22,7 +22,7 @@ HAIR, RIG = "/Hero/Hair", "/Hero/Rig"
 
 
 def test_a_name_too_long_for_a_file_is_told(tmp_path):
-    """In one line, by the Python calls as by the command."""
+    """In one line, by the Python calls and by the command."""
     shot = write_shot(tmp_path, Recipe())
     with pytest.raises(NeuralocksError, match="File name too long"):
         bake(shot, tmp_path / f"{'a' * 300}.usdc", frames="1:2")
@@ -64,7 +64,7 @@ def test_names_that_usd_cannot_keep_are_told(tmp_path, model):
 @pytest.mark.skipif(os.sep == "\\", reason="there it is a slash")
 @pytest.mark.parametrize("name", ["a\\b/hair.usdc", "a\\b.usdc"])
 def test_a_backslash_in_a_bakes_path_is_told(tmp_path, model, name):
-    """USD makes a slash of it, and would open the bake without its shot."""
+    """USD turns it into a slash, and would open the bake without its shot."""
     out = tmp_path / name
     out.parent.mkdir(exist_ok=True)
     shot = write_shot(out.parent)

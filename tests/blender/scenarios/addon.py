@@ -14,7 +14,7 @@ from tests.blender.panel import drawn, preferences
 
 
 def lifecycle(folder: Path) -> None:
-    """Enable, disable, enable, load another file: nothing is left behind, nothing is there twice."""
+    """Enable, disable, enable, load another file: nothing is left behind or duplicated."""
     import dcc_addon
 
     before = len(own_handlers())
@@ -43,7 +43,7 @@ def _menu_entries() -> list:
 
 
 def panel(folder: Path) -> None:
-    """The panel can be drawn at every step of an artist's work, and says what is found and what is wrong."""
+    """The panel can be drawn at every step of an artist's work, and says what was found and what is wrong."""
     from dcc_addon.session import session
 
     scene = bpy.context.scene
@@ -60,7 +60,7 @@ def panel(folder: Path) -> None:
     strands = scenes.hair(rig, 10)
     strands.neuralocks_hair.armature = None
     scene.neuralocks.hair = strands
-    attach = "Attach to Character"  # in the menu always
+    attach = "Attach to Character"  # always in the menu
     assert drawn().count(attach) == 2
     make_live(rig, strands)
     said = drawn()
@@ -81,7 +81,7 @@ def panel(folder: Path) -> None:
 
 
 def model_of_another_body(folder: Path) -> None:
-    """The panel tells of live hair whose model was trained on a body of other measures, and by what."""
+    """The panel tells if live hair's model was trained on a body of other measures, and which measure differs."""
     from neuralocks_core import model
 
     shipped, rig = model.read(model.shipped("strands")), scenes.armature()
@@ -113,8 +113,8 @@ def hair_beside_its_character(_folder: Path) -> None:
 
 
 def told_of_what_is_there(_folder: Path) -> None:
-    """What is told of an object goes with it: after it is renamed or deleted, another one that gets its name is not told of
-    by it, and the same hair is under its new name.
+    """Messages go with their object: after it is renamed or deleted, another object that gets its name has none of its messages,
+    and the same hair is listed under its new name.
     """
     from dcc_addon.session import session
 
@@ -137,7 +137,7 @@ def told_of_what_is_there(_folder: Path) -> None:
     bpy.context.view_layer.update()
     assert not messages(), messages()
 
-    session.tell("Rig", NeuralocksError("Rig: a bone of it is gone"))  # as sampling beside the artist does
+    session.tell("Rig", NeuralocksError("Rig: a bone of it is gone"))  # as sampling in the background does
     rig.name = "Anna"
     bpy.context.view_layer.update()
     assert not messages(), messages()
@@ -181,7 +181,7 @@ def remedy_in_full(_folder: Path) -> None:
 
 
 def command_is_copied(_folder: Path) -> None:
-    """Typed from the panel, where it is broken into lines, it would come out wrong."""
+    """Typed from the panel, where it is wrapped into lines, it would come out wrong."""
     from dcc_addon.operators.training import NEURALOCKS_OT_copy_install
     from dcc_addon.services.training_job import installing
 

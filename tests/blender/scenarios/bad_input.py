@@ -12,7 +12,7 @@ from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, me
 
 
 def bad_input(folder: Path) -> None:
-    """Each in plain words, no traceback, nothing lost."""
+    """Each is refused in plain words, without a traceback, and nothing is lost."""
     operators, scene = bpy.ops.neuralocks, bpy.context.scene
     refused(operators.find, "no armature")
     refused(operators.sample_motion, "no armature")
@@ -90,7 +90,7 @@ def _no_strands(rig) -> None:
 
 
 def bad_hair(folder: Path) -> None:
-    """Hair and models that cannot be live say why, and what is deleted or hidden meanwhile takes nothing along."""
+    """Hair and models that cannot be live say why, and deleting or hiding something meanwhile breaks nothing else."""
     rig = scenes.armature()
     skin = scenes.body(rig)
     scenes.dance(rig)
@@ -156,7 +156,7 @@ def _excluded(hair, folder: Path) -> np.ndarray:
 
 
 def _hidden(hair, others: list, shown: np.ndarray, folder: Path) -> None:
-    """Hidden hair is where it is; a hidden armature that nothing seen depends on stands still, which is no motion."""
+    """Hidden hair is where it is; a hidden armature that nothing visible depends on stands still, which is not its motion."""
     hair.hide_viewport = True
     bpy.context.scene.frame_set(20)
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "hidden.usdc")) == {"FINISHED"}
@@ -170,7 +170,7 @@ def _hidden(hair, others: list, shown: np.ndarray, folder: Path) -> None:
 
 
 def _deleted(rig, skin, strands, other) -> None:
-    """The body is deleted while it is sampled, hair while it is live; what is left gets other names."""
+    """The body is deleted while it is sampled, hair while it is live; what is left is renamed."""
     from dcc_addon.scene.sampling import in_slices
 
     steps = in_slices(bpy.context, rig, 0.0)
@@ -189,11 +189,11 @@ def _deleted(rig, skin, strands, other) -> None:
 
 
 def new_folder(folder: Path) -> None:
-    """A bake makes the folders that are missing below one that its user may write to, and no others."""
+    """A bake makes missing folders below one that its user may write to, and no others."""
     rig = scenes.armature()
     strands = scenes.hair(rig, 10)
     bpy.context.scene.neuralocks.armature, strands.neuralocks_hair.model = rig, MODEL
-    with patch("os.access", lambda path, mode: Path(path).is_relative_to(folder)):  # as for anybody but root
+    with patch("os.access", lambda path, mode: Path(path).is_relative_to(folder)):  # as for anyone but root
         assert bpy.ops.neuralocks.bake(filepath=str(folder / "new" / "deeper" / "bake.usdc")) == {"FINISHED"}
         assert (folder / "new" / "deeper" / "bake.usdc").exists()
         elsewhere = str(folder.parent / "other" / "bake.usdc")
@@ -202,7 +202,7 @@ def new_folder(folder: Path) -> None:
 
 
 def no_file(folder: Path) -> None:
-    """A header is not written over a folder, nor without a name beside a file that is not saved."""
+    """A header is not written over a folder, nor, without a file name, beside a file that is not saved."""
     rig, export = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.ops.neuralocks.export_c
     bpy.context.scene.neuralocks.armature = rig
     refused(export, "//Rig_hair.h", "not saved yet")
@@ -211,7 +211,7 @@ def no_file(folder: Path) -> None:
 
 
 def into_a_folder(folder: Path) -> None:
-    """A bake needs the name of a file: beside a folder, under its name, nobody would look for it."""
+    """A bake needs the name of a file: nobody would look for it beside a folder, under the folder's name."""
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
     strands, operators = scenes.hair(rig, 10), bpy.ops.neuralocks
@@ -224,9 +224,7 @@ def into_a_folder(folder: Path) -> None:
 
 
 def not_ours(folder: Path) -> None:
-    """What an artist has made himself is not written over, be it what is written beside a bake; what was baked before
-    is.
-    """
+    """Files that an artist made are not overwritten, not even by what is written beside a bake; earlier bakes are."""
     from pxr import Usd
 
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)

@@ -23,8 +23,8 @@ from tests.blender.checks import (
 
 
 def keyed_bones(folder: Path) -> None:
-    """Hair bones that the artist has keyed, as a key on the whole character does: the baked keys show all the same, and
-    muted give the artist's back, as they do for bones without keys.
+    """Hair bones that the artist has keyed, for example by a key on the whole character: the baked keys show all the same, and
+    muting them gives the artist's back, as for bones without keys.
     """
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.body(rig)
@@ -58,8 +58,8 @@ def keyed_bones(folder: Path) -> None:
 
 @patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
 def keyed_anew(folder: Path) -> None:
-    """A second bake of the hair bones that is refused, or cancelled, leaves the first one as it is, and Live; one that is
-    not takes its place, and finds the bones as they were before the first.
+    """A second bake of the hair bones that is refused or cancelled leaves the first one, and Live, as they are; one that succeeds
+    replaces it, and starts from the bones as they were before the first.
     """
     from types import SimpleNamespace
 
@@ -103,7 +103,7 @@ def keyed_anew(folder: Path) -> None:
 
 
 def keys_under_live(folder: Path) -> None:
-    """Live switched on over baked keys, and the keys removed meanwhile: Live goes on, and in the end the hair bones are
+    """Live is switched on over baked keys, and the keys are removed meanwhile: Live continues, and at the end the hair bones are
     turned as the artist had turned them.
     """
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
@@ -135,8 +135,8 @@ def keys_under_live(folder: Path) -> None:
 
 
 def strands_beside_keyed_bones(folder: Path) -> None:
-    """Strands of a character whose hair bones are baked are those that it has without, or with live ones, shown and baked,
-    whether the track is muted or not; a track with the star plays alone, also for them.
+    """Strands of a character with baked hair bones are the same as without them, or with live ones, shown and baked, whether the
+    track is muted or not; a solo track plays alone, also for strands.
     """
     from dcc_addon.scene.up_to_date import notice
     from dcc_addon.session import session

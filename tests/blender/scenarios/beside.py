@@ -12,8 +12,8 @@ from tests.blender.checks import MODEL, apart, make_live, messages, points_at, r
 
 
 def prepared_once(_folder: Path) -> None:
-    """An edit of one character's animation prepares no hair again, neither its own nor that of others; an edit of its
-    body, and another armature for the hair, do.
+    """An edit of one character's animation does not prepare any hair again, its own or others'; an edit of its body, or another
+    armature for the hair, does.
     """
     from dcc_addon.session import session
 
@@ -58,7 +58,7 @@ def prepared_once(_folder: Path) -> None:
     assert apart(fresh(one), wide) == 0.0
 
     prepared = session.hairs["One"].hair
-    one.location.y += 0.05  # the same character, yet other hair on it
+    one.location.y += 0.05  # the same character, but other hair on it
     sample()
     there = points_at(one, 12)
     assert session.hairs["One"].hair is not prepared and apart(fresh(one), there) == 0.0
@@ -72,7 +72,7 @@ def prepared_once(_folder: Path) -> None:
 
 
 def prepared_beside(_folder: Path) -> None:
-    """In a window a thread prepares the hair: at rest until then, as ever afterwards; Live cancels; a render waits."""
+    """In a window, a thread prepares the hair: it is at rest until then, and as usual afterwards; Live cancels; a render waits."""
     rig = scenes.armature()
     scenes.dance(rig)
     strands = scenes.hair(rig, 1500)
@@ -125,7 +125,7 @@ def _in_a_window(strands, shown, groomed) -> None:
 
 @patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
 def loaded_meanwhile(folder: Path) -> None:
-    """Another file is opened while a bake samples, or Blender ends a bake that the panel shows: live goes on."""
+    """Another file is opened while a bake samples, or Blender ends a bake that the panel shows: live hair continues."""
     from types import SimpleNamespace
 
     from dcc_addon.operators.bake import bake_steps
@@ -167,7 +167,7 @@ def loaded_meanwhile(folder: Path) -> None:
 
 
 def cancelled(folder: Path) -> None:
-    """Of a bake that is cancelled or refused nothing stays, and what an earlier one wrote is as it was."""
+    """A bake that is cancelled or refused leaves nothing, and what an earlier one wrote stays as it was."""
     from dcc_addon.operators.bake import bake_steps
 
     rig = scenes.armature()
@@ -206,7 +206,7 @@ def cancelled(folder: Path) -> None:
 
 
 def prepared_together(_folder: Path) -> None:
-    """Showing one hair may stop what others are prepared from, or fail: the rest arrives all the same."""
+    """Showing one hair may stop the preparation of others, or fail: the rest arrives all the same."""
     import dcc_addon.preparing as preparing
     from dcc_addon.session import session
 
@@ -236,7 +236,7 @@ def prepared_together(_folder: Path) -> None:
 
 @patch("dcc_addon.background.SLICE", 0.0)
 def sampled_beside(_folder: Path) -> None:
-    """Sampling in the background ends whatever goes wrong, says what, and tries again when the rig is mended."""
+    """Sampling in the background ends whatever goes wrong, says what, and tries again when the rig is fixed."""
     from dcc_addon import background
     from dcc_addon.scene import sampling
     from dcc_addon.session import session

@@ -17,8 +17,8 @@ from tests.blender.checks import SAME, apart, baked_points, make_live, points_at
 
 
 def body_as_drawn(_folder: Path) -> None:
-    """The body that hair is kept out of is the one that Blender draws: with half of it made by a mirror modifier, shape
-    keys on a vertex group only, groups named like bones that deform nothing.
+    """The body that hair is kept out of is the one that Blender draws: with half of it from a mirror modifier, shape keys limited
+    to a vertex group, and groups named like bones that deform nothing.
     """
     scene, rig = bpy.context.scene, scenes.armature(bones=(*scenes.BONES, ("scalp", "head", (0, 0.5, 1), (0, 0.6, 1))))
     rig.data.bones["scalp"].use_deform = False
@@ -58,7 +58,7 @@ def body_as_drawn(_folder: Path) -> None:
 
 
 def absolute_shape_keys(_folder: Path) -> None:
-    """Absolute shape keys, which the time alone blends, without their groups and values, deform the body as drawn."""
+    """Absolute shape keys, which only time blends, without groups and values, deform the body as drawn."""
     rig = scenes.armature()
     scenes.dance(rig)
     body = scenes.body(rig)
@@ -118,8 +118,8 @@ def rigid_bodies(_folder: Path) -> None:
 
 
 def weighted_elsewhere(_folder: Path) -> None:
-    """A chosen body that no bone of the character moves is told, with the rig that moves it; one that goes with bones of
-    the same names, or rides on one, is not.
+    """A chosen body that no bone of the character moves gets a note, with the rig that moves it; one that moves with bones of the
+    same names, or rides on one, does not.
     """
     from dcc_addon.operators.character import NEURALOCKS_OT_check
     from dcc_addon.panels import findings
@@ -150,7 +150,7 @@ def weighted_elsewhere(_folder: Path) -> None:
 
 
 def no_faces(folder: Path) -> None:
-    """A mesh that only modifiers give faces, and that the armature deforms, keeps nobody from baking."""
+    """A mesh that gets its faces only from modifiers, and that the armature deforms, does not prevent a bake."""
     rig = scenes.armature()
     scenes.dance(rig)
     body, strands = scenes.body(rig), scenes.hair(rig, 10)
@@ -183,7 +183,7 @@ def _same(rig, body) -> int:
 
 
 def drawn_elsewhere(_folder: Path) -> None:
-    """A body that more than its weights and shape keys moves is told of, with how far and by what; no plain one is."""
+    """A body moved by more than its weights and shape keys gets a note on how far and by what; a plain one does not."""
     scene, rig = bpy.context.scene, scenes.armature()
     scenes.dance(rig)
     body, strands = scenes.body(rig), scenes.hair(rig, 4)

@@ -13,7 +13,7 @@ from tests.blender.checks import SAME, apart, bones_at, give_bone_model, make_li
 
 
 def bones(folder: Path) -> None:
-    """Hair bones: live equals baked keys; keys on exactly these bones, in an action of their own that can be muted."""
+    """Hair bones: live equals baked keys; keys on exactly these bones, in a separate action that can be muted."""
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.body(rig)
     scenes.dance(rig)
@@ -87,7 +87,7 @@ def bones(folder: Path) -> None:
 
 
 def bones_without_their_mesh(folder: Path) -> None:
-    """A model knows its bones: they move where the mesh is not rendered, and where there is none."""
+    """A model knows its bones: they move even if the mesh is not rendered, or there is none."""
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     skin = scenes.body(rig)
     scenes.dance(rig)
@@ -110,7 +110,7 @@ def bones_without_their_mesh(folder: Path) -> None:
 
 
 def renamed_bones(folder: Path) -> None:
-    """A bone that gets another name is noticed as one more bone would be; it is turned as it was before it was live."""
+    """A renamed bone is noticed like an added one; it is turned as it was before it was live."""
     from dcc_addon import live
     from dcc_addon.panels import findings
 
@@ -137,7 +137,7 @@ def renamed_bones(folder: Path) -> None:
 
 
 def another_model(folder: Path) -> None:
-    """Bones that only one of two models turns are as they were when the other one takes over, and when Live goes off."""
+    """Bones that only one of two models turns are restored when the other one takes over, and when Live goes off."""
     side = (("hair.L", "head", (0.09, 0, 1.7), (0.14, 0, 1.6)), ("hair.L.02", "hair.L", (0.14, 0, 1.6), (0.15, 0, 1.5)))
     models = []
     for name, more in (("Few", ()), ("Rig", side)):
@@ -162,7 +162,7 @@ def another_model(folder: Path) -> None:
         own.rig_model = model
         bones_at(rig, 12)
         assert turned(tail) > 0.01 and (turned(lock) > 0.01) == moves and not messages(), (model, messages())
-    shutil.copy(few, every)  # trained anew under the same name, for fewer bones
+    shutil.copy(few, every)  # retrained under the same name, for fewer bones
     bones_at(rig, 9)
     bones_at(rig, 12)
     assert turned(tail) > 0.01 and turned(lock) < 1e-6 and not messages(), messages()
@@ -171,7 +171,7 @@ def another_model(folder: Path) -> None:
 
 
 def forged_memories(folder: Path) -> None:
-    """What a file remembers of bones and modifiers may have been written by anybody: what nobody can have put aside is
+    """What a file remembers of bones and modifiers may have been written by anybody: values that the add-on never stores are
     ignored, the rest comes back, and live bones still know their rest.
     """
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)

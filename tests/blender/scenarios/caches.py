@@ -14,8 +14,8 @@ from tests.blender.panel import drawn
 
 
 def attached_again(folder: Path) -> None:
-    """Attached hair is saved, opened elsewhere, attached anew with another look, when its files are gone, and freed of
-    its cache.
+    """Attached hair is saved, opened elsewhere, attached again with another look, also when its files are gone, and its cache is
+    removed.
     """
     needs_usd()
     operators, here = bpy.ops.neuralocks, folder / "here"
@@ -59,8 +59,8 @@ def attached_again(folder: Path) -> None:
 
 
 def baked_over(folder: Path) -> None:
-    """A bake to the file that hair plays is shown at once, as it is when the file is opened again; also where the hair is
-    called otherwise in it.
+    """A bake to the file that hair plays is shown at once, as it is when the file is opened again; also if the hair has another
+    name in it.
     """
     needs_usd()
     operators, rig, scene = bpy.ops.neuralocks, scenes.armature(), bpy.context.scene
@@ -87,8 +87,8 @@ def baked_over(folder: Path) -> None:
 
 
 def taken_off(folder: Path) -> None:
-    """A cache plays the frames that were baked where time is stretched, too; when it is taken off, be it while live is on,
-    the hair follows its surface as before.
+    """A cache plays the baked frames even if time is stretched; when it is removed, even while live is on, the hair follows its
+    surface as before.
     """
     needs_usd()
     operators, rig, scene = bpy.ops.neuralocks, scenes.armature(), bpy.context.scene
@@ -113,8 +113,8 @@ def taken_off(folder: Path) -> None:
 
 
 def stretched_since(folder: Path) -> None:
-    """Time that is stretched otherwise since hair was attached is told, with the remedy, which makes the hair what live hair
-    is: the cache goes on in step with the body, in the motion of before, and stands still where that ends.
+    """If time stretching changes after hair was attached, a note says so, with the remedy, which makes the hair equal to live hair.
+    Until then, the cache stays in step with the body, plays the old motion, and stands still where that ends.
     """
     needs_usd()
     rig, scene = scenes.armature(), bpy.context.scene
@@ -147,8 +147,8 @@ def stretched_since(folder: Path) -> None:
 
 
 def drawn_alike(folder: Path) -> None:
-    """What is live and what is attached have the same smooth curves, thickness and bounds; Bezier strands, whose handles
-    are no points, are refused.
+    """Live and attached hair have the same smooth curves, thickness and bounds; Bezier strands, whose handles are not points, are
+    refused.
     """
     if "set_types" not in bpy.types.Curves.bl_rna.functions:
         if "add_curves" not in bpy.types.Curves.bl_rna.functions:
@@ -210,7 +210,7 @@ def _drawn(strands, frame: int) -> tuple:
     smooth = np.array([vertex.co for vertex in probe.evaluated_get(graph).data.vertices])
     evaluated = strands.evaluated_get(graph)
     radius = evaluated.data.attributes.get("radius")
-    # Cycles draws hair without this attribute so thick.
+    # Cycles draws hair without this attribute this thick.
     thick = 0.005 if radius is None else max(value.value for value in radius.data)
     corners = np.array([corner[:] for corner in evaluated.bound_box])
     bpy.data.objects.remove(probe)

@@ -92,8 +92,8 @@ def _moved_in_the_past(rig) -> tuple:
 
 
 def unmuted_after_a_render(_folder: Path) -> None:
-    """A track that was muted in a render, and plays again since: hair goes with the body that the next frames show, in the
-    view and in the next render, though newer Blenders play such a track only once the scene is put together anew.
+    """A track was muted in a render and then unmuted: hair follows the body that the next frames show, in the view and in the next
+    render, although newer Blenders play such a track only after the dependencies are rebuilt.
     """
     from dcc_addon import background
     from dcc_addon.session import session
@@ -145,8 +145,8 @@ def _vertices(skin) -> np.ndarray:
 
 
 def held_otherwise(_folder: Path) -> None:
-    """What is not keyed counts in all frames: where it changes in the past alone, a render knows; a body that is put
-    elsewhere is noticed in the next frame.
+    """Unkeyed values count in all frames: a change that only affects the past is noticed by a render; a moved body is noticed in
+    the next frame.
     """
     from dcc_addon import handlers
     from dcc_addon.session import session
@@ -206,7 +206,7 @@ def held_otherwise(_folder: Path) -> None:
 
 
 def hidden_prop(folder: Path) -> None:
-    """A prop that is hidden by a scale of zero does not keep anybody from baking; of a bone that moves hair it is told."""
+    """A prop hidden by a scale of zero does not prevent a bake; a hidden bone that moves hair gets a message."""
     prop = [*scenes.BONES, ("prop", "forearm.L", (0.5, 0, 1.2), (0.6, 0, 1.2))]
     rig, scene = scenes.armature(bones=prop), bpy.context.scene
     scenes.body(rig)
@@ -231,7 +231,7 @@ def hidden_prop(folder: Path) -> None:
 
 
 def hidden_armature(folder: Path) -> None:
-    """A character that is hidden by the scale of its armature, or of what that hangs from, is told so, not of a bone."""
+    """For a character hidden by the scale of its armature, or of a parent, the message says so, and does not blame a bone."""
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.body(rig)
     scenes.dance(rig)

@@ -11,8 +11,8 @@ from tests.blender.checks import give_bone_model, refused
 
 
 def headers_of_two(folder: Path) -> None:
-    """A header is of the character that is shown, under its name, so that it takes no other's place; where the model is
-    another rig's, the example's say, there is none.
+    """A header belongs to the character shown and has its name, so that it does not replace another's; if the model is another
+    rig's, such as the example's, no header is written.
     """
     scene, folder = bpy.context.scene, folder / "here"
     folder.mkdir()
@@ -28,7 +28,7 @@ def headers_of_two(folder: Path) -> None:
 
 
 def told_of_the_export(folder: Path) -> None:
-    """What is to be known of hair bones that were written is told, of the character and in the panel's words."""
+    """Notes on exported hair bones are reported, about the character and in the panel's words."""
     from dcc_addon.operators.rig import NEURALOCKS_OT_export_skel
 
     rig, said = scenes.armature(bones=scenes.BONES + scenes.TAIL), []
@@ -45,7 +45,7 @@ def told_of_the_export(folder: Path) -> None:
 
 
 def export_cancelled(folder: Path) -> None:
-    """While bones are baked for another program Blender takes events, and Esc leaves nothing of it."""
+    """While bones are baked for another program, Blender takes events, and Esc leaves nothing behind."""
     from dcc_addon.operators.rig import NEURALOCKS_OT_export_skel
 
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)

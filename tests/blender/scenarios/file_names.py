@@ -10,7 +10,7 @@ from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, ne
 
 
 def one_output(folder: Path) -> None:
-    """The bake of a second character gets a file of its own, and goes over that the next time; so does its rig's."""
+    """The bake of a second character gets its own file, and overwrites that the next time; so does its rig's."""
     scene, made, hairs = bpy.context.scene, {}, {}
     scene.neuralocks.output = str(folder / "out.usdc")
     for name, aside in (("Rig", 0), ("Bob.001", 2)):
@@ -35,7 +35,7 @@ def one_output(folder: Path) -> None:
 
 
 def like_names(folder: Path) -> None:
-    """Hair objects of which a plain name says too little all play files of their own, again when they are baked again."""
+    """Hair objects whose plain names would be the same each play their own file, also when they are baked again."""
     needs_usd()
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)

@@ -10,8 +10,8 @@ from tests.blender.checks import choose
 
 
 def found_together(_folder: Path) -> None:
-    """The template that Rigify leaves in the scene, and other rigs, are not taken for the one that carries the hair, or
-    the skin that is selected; nor does a rig get the hair of another.
+    """The template that Rigify leaves in the scene, and other rigs, are not mistaken for the rig that carries the hair or the
+    selected skin; and a rig does not get another's hair.
     """
     metarig, rig, other = (scenes.armature(name) for name in ("A template", "Rig", "Zoe"))
     assert _found(None) == (metarig, None)
@@ -26,14 +26,14 @@ def found_together(_folder: Path) -> None:
     own = scenes.hair(rig, 5, name="Own")
     assert _found(rig) == (rig, own) and _found(skin) == (rig, own) and _found(metarig) == (metarig, loose)
     choose(other)
-    own.select_set(True)  # both by the artist, who may want to give it this hair
+    own.select_set(True)  # both selected by the artist, who may want to give it this hair
     assert bpy.ops.neuralocks.find() == {"FINISHED"}
     assert (bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair) == (other, own)
     assert own.neuralocks_hair.armature == rig
 
 
 def _found(selected) -> tuple:
-    """What is found with an object selected, or none, of hair that is attached to no character yet."""
+    """What is found with an object selected, or none, for hair that is not attached to a character yet."""
     settings = bpy.context.scene.neuralocks
     settings.armature = settings.hair = None
     for thing in bpy.context.scene.objects:

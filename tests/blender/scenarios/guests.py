@@ -14,8 +14,8 @@ from tests.blender.witness import ENGINE, film, witness
 
 
 def drawn_by_another_scene(folder: Path) -> None:
-    """Scrubbed and rendered in the scene that draws it, in a file just opened, too, live hair is what its own scene shows at
-    that frame, whichever is in view; within the shutter as well, and on hair bones that are live.
+    """Scrubbed and rendered in the scene that draws it, also in a file just opened, live hair is what its own scene shows at that
+    frame, whichever is in view; also within the shutter, and with live hair bones.
     """
     from dcc_addon.scene.layers import graph_of
 
@@ -60,8 +60,8 @@ def drawn_by_another_scene(folder: Path) -> None:
 
 @patch("dcc_addon.live_strands.at_once", lambda graph: False)
 def shown_before_its_own_scene(folder: Path) -> None:
-    """Of a file that opens in the scene that draws it, hair is sampled in a scene that Blender has never shown, prepared beside
-    Blender, and then is as in its own; also what is of the first frame, where the file was saved at another.
+    """If a file opens in the scene that draws the hair, the hair is sampled in a scene that Blender has never shown, prepared in
+    the background, and then is as in its own scene; also at the first frame, if the file was saved at another.
     """
     from dcc_addon import background, preparing
     from dcc_addon.scene.layers import graph_of
@@ -86,9 +86,7 @@ def shown_before_its_own_scene(folder: Path) -> None:
 
 
 def not_drawn_by_another_scene(_folder: Path) -> None:
-    """A scene that shows nothing of a character leaves its hair alone, and so does one that has it in a collection that it
-    excludes.
-    """
+    """A scene that does not show a character leaves its hair alone, and so does one that has it in an excluded collection."""
     from dcc_addon.scene import curves
     from dcc_addon.scene.guests import guests
 
@@ -114,7 +112,7 @@ def not_drawn_by_another_scene(_folder: Path) -> None:
 
 
 def named_as_another(folder: Path) -> None:
-    """A set out of a library moves beside objects of the same names; and no scene's objects are gone through twice a frame, for
+    """A set from a library moves beside objects of the same names; and no scene's objects are scanned twice per frame, because
     there may be ten thousand.
     """
     from dcc_addon import live
@@ -139,7 +137,7 @@ def named_as_another(folder: Path) -> None:
 
 
 def _own(folder):
-    """A scene with a character in a collection of its own, whose hair is live, and with a folder hair bones too."""
+    """A scene with a character in its own collection, with live hair, and if a folder is given, hair bones too."""
     rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
     scenes.body(rig)
     scenes.dance(rig)

@@ -19,8 +19,8 @@ HAS_USD = getattr(bpy.app.build_options, "usd", False)
 
 
 def resting_surface(folder: Path) -> None:
-    """The switch of Blender's hair assets that takes the surface at rest is off while the hair is live or plays a cache, and
-    is given back by each way out, whatever the modifier is called by then; what the artist had off stays off.
+    """The switch of Blender's hair assets that uses the surface at rest is off while the hair is live or plays a cache, and is
+    restored in every way of ending that, whatever the modifier's name is by then; what the artist had off stays off.
     """
     rig = scenes.armature()
     scenes.dance(rig)
@@ -79,8 +79,8 @@ def resting_surface(folder: Path) -> None:
 
 
 def grown_by_assets(_folder: Path) -> None:
-    """Children from Blender's own hair assets grow on the skin that moves, live as without, before what deforms the hair in
-    the stack.
+    """Children from Blender's own hair assets grow on the moving skin, with Live as without, before the modifiers in the stack that
+    deform the hair.
     """
     if bpy.app.version < (4, 2):
         raise SkipTest("assets of hair are younger")
@@ -123,7 +123,7 @@ def grown_by_assets(_folder: Path) -> None:
 
 
 def _lifting(label: str):
-    """A tree that lifts the hair by 10 cm where its switch of this name is on."""
+    """A tree that lifts the hair by 10 cm if its switch of this name is on."""
     tree, source, target = geometry_nodes(f"Lift {label}")
     if hasattr(tree, "interface"):
         tree.interface.new_socket(label, in_out="INPUT", socket_type="NodeSocketBool")
@@ -152,7 +152,7 @@ def _give(modifier, label: str, value) -> None:
 
 
 def _give_map(modifier) -> None:
-    """Name the UV map that the asset is to read, where it asks for one."""
+    """Name the UV map that the asset reads, if it asks for one."""
     identifier = _input(modifier, "Surface UV Map")
     if not identifier:
         return

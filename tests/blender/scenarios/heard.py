@@ -10,7 +10,7 @@ from tests.blender.checks import SAME, apart, bones_at, choose, give_bone_model,
 
 
 def turned_otherwise(folder: Path) -> None:
-    """Hair bones that something else turns, too, are refused, live and by bakes, and keys that would not be heard; where
+    """Hair bones that something else also turns are refused, by Live and by bakes, and so are keys that would have no effect; if
     time is stretched, keys play as the live view does.
     """
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
@@ -60,8 +60,8 @@ def _edit_a_strip(rig) -> None:
 
 
 def keys_that_do_not_play(folder: Path) -> None:
-    """Keys in every rotation mode refuse a bake of hair bones only where they play: not those of muted curves and groups, nor
-    those of what else moves by the same action.
+    """Keys in every rotation mode prevent a bake of hair bones only if they play: not those of muted curves and groups, nor those
+    of other things that the same action moves.
     """
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
@@ -95,8 +95,8 @@ def keys_that_do_not_play(folder: Path) -> None:
 
 
 def baked_by_blender(folder: Path) -> None:
-    """What Blender's own Bake Action makes of live hair bones plays on when Live is off, in Euler angles, which it did not
-    bake, or not; a bone that has keys in its own mode, too, gets that back.
+    """What Blender's own Bake Action makes of live hair bones keeps playing when Live is off, whether in Euler angles, which it did
+    not bake, or not; a bone that also has keys in its own mode gets that mode back.
     """
     rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
     scenes.body(rig)

@@ -10,7 +10,7 @@ from tests.blender.checks import SAME, apart, baked_points, make_live, messages,
 
 
 def hidden_hair(folder: Path) -> None:
-    """Hair that hangs in whatever way is baked where it would be shown, in an excluded collection or disabled."""
+    """Hair attached in any way is baked where it would be shown, even in an excluded collection or disabled."""
     for number, hang in enumerate((_child_of, _keyed, _vertex, _below_keyed)):
         shown = _baked(folder / f"{number}_shown.usdc", hang, lambda strands: None)
         for way, hide in (("disabled", _disable), ("excluded", _exclude), ("both", _disable_unseen)):
@@ -49,7 +49,7 @@ def swapped_in(_folder: Path) -> None:
 
 
 def _baked(out: Path, hang, hide) -> dict:
-    """Points by frame of hair that hangs and is hidden in some way."""
+    """Points by frame of hair that is attached and hidden in some way."""
     scenes.empty()
     rig = scenes.armature()
     scenes.dance(rig)
@@ -95,7 +95,7 @@ def _disable(strands) -> None:
 
 
 def _disable_unseen(strands) -> None:
-    """By the eye of the outliner, too, which alone would leave it evaluated."""
+    """Also by the eye of the outliner, which alone would leave it evaluated."""
     strands.hide_set(True)
     _disable(strands)
 

@@ -70,8 +70,8 @@ def undo(folder: Path) -> None:
 
 
 def applied_and_undone(_folder: Path) -> None:
-    """What is applied to the points of live hair is applied to its rest shape at once, for Live may be switched off next;
-    and again where an undo goes back to what Blender had before the add-on did that.
+    """What is applied to the points of live hair is applied to its rest shape at once, because Live may be switched off next; and
+    again if an undo goes back to the state before the add-on did that.
     """
     from dcc_addon.handlers import on_update
     from dcc_addon.scene import curves
@@ -100,7 +100,7 @@ def applied_and_undone(_folder: Path) -> None:
         bpy.ops.ed.undo_push(message="before")
         bpy.app.handlers.depsgraph_update_post.remove(on_update)
         change()
-        bpy.ops.ed.undo_push(message="applied")  # which Blender does before it tells of it
+        bpy.ops.ed.undo_push(message="applied")  # Blender does this before it calls handlers
         bpy.app.handlers.depsgraph_update_post.append(on_update)
         strands.update_tag()
         bpy.context.view_layer.update()

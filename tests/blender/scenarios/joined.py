@@ -41,8 +41,8 @@ def joined_to_resting(folder: Path) -> None:
 
 
 def joined_standing_differently(_folder: Path) -> None:
-    """Live hairs that stand differently keep their grooms in the world when they are joined, whichever of them is live,
-    after an undo and a redo, too, and where one is a copy of the other.
+    """Live hairs with different transforms keep their grooms in the world when they are joined, whichever of them is live, also
+    after undo and redo, and if one is a copy of the other.
     """
     from dcc_addon.scene import curves
 
@@ -67,9 +67,9 @@ def joined_standing_differently(_folder: Path) -> None:
         before = np.concatenate([scenes.points(strands), scenes.points(other)])
         bpy.ops.ed.undo_push(message="before")
         _join(strands, other, followed=False)
-        bpy.ops.ed.undo_push(message="joined")  # which Blender does before it tells of it
+        bpy.ops.ed.undo_push(message="joined")  # Blender does this before it calls handlers
         if "Hair" in live:
-            assert apart(points_at(strands, 9), before) < 0.1  # in other locks, but nowhere else
+            assert apart(points_at(strands, 9), before) < 0.1  # in other locks, but at the same place
         strands.update_tag()
         bpy.context.view_layer.update()
         assert apart(curves.points(strands.data), grooms) < 2e-6, (live, copied)
@@ -84,7 +84,7 @@ def joined_standing_differently(_folder: Path) -> None:
 
 
 def root_at_the_origin(_folder: Path) -> None:
-    """A point at the very origin of its object rests there, and is not taken for one that has no rest shape."""
+    """A point exactly at the origin of its object rests there, and is not mistaken for one without a rest shape."""
     from dcc_addon.scene import curves
 
     rig = scenes.armature()

@@ -13,7 +13,7 @@ FRAMES = (3, 11, 20)
 
 
 def keyed_on_a_ride(folder: Path) -> None:
-    """The keys of a character that rides on something go on playing after its motion is sampled, which is done without them."""
+    """The keys of a character that rides on something still play after its motion is sampled, which is done without them."""
     rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
     cart = bpy.data.objects.new("Cart", None)
     scene.collection.objects.link(cart)

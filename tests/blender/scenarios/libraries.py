@@ -32,7 +32,7 @@ def linked(folder: Path) -> None:
     assert "linked" in message and "Make Local" in message, messages()
     strands.neuralocks_hair.live = False
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "linked.usdc")) == {"FINISHED"}
-    # What is done to linked data is not saved.
+    # Changes to linked data are not saved.
     refused(bpy.ops.neuralocks.bake_attach, "linked from library.blend")
     refused(bpy.ops.neuralocks.assign, "linked from library.blend")
     refused(bpy.ops.neuralocks.train, "linked from library.blend")
@@ -44,7 +44,7 @@ def linked(folder: Path) -> None:
     assert not strands.modifiers
     assert apart(points_at(strands, 1), groomed) < 1e-6
 
-    bpy.data.libraries[0].reload()  # what this script alone could set on it
+    bpy.data.libraries[0].reload()  # drop what only this script could set on it
     bpy.data.collections["Character"].override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
     rig, strands = (
         next(o for o in bpy.data.objects if o.type == kind and not o.library) for kind in ("ARMATURE", "CURVES")
@@ -77,7 +77,7 @@ def linked(folder: Path) -> None:
 
 
 def instanced(folder: Path) -> None:
-    """A character that is an instance of a collection: it is told what that is, and each remedy that is named works."""
+    """A character that is a collection instance: the message says so, and each remedy that it names works."""
     rig = scenes.armature()
     scenes.dance(rig)
     scenes.hair(rig, 20)
@@ -141,7 +141,7 @@ def beside_the_file(folder: Path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(shots / "copy.blend"), copy=True)
     assert strands.neuralocks_hair.model == "//mine.neuralocks"
     bpy.ops.wm.save_mainfile()
-    if bpy.app.version >= (4, 0):  # older ones do not tell where a file will be saved
+    if bpy.app.version >= (4, 0):  # older ones do not say where a file will be saved
         bpy.ops.wm.save_as_mainfile(filepath=str(shots / "moved.blend"))
         assert apart(scenes.points(strands), shown) < 1e-6 and not messages(), messages()
         for name in ("copy", "moved"):
@@ -165,7 +165,7 @@ def beside_the_file(folder: Path) -> None:
 
 
 def written_by_a_script(folder: Path) -> None:
-    """What a script wrote into a library while Live was on is at rest where it is appended, and says so where it is linked."""
+    """Hair that a script wrote into a library while Live was on is at rest if appended, and says so if linked."""
     from dcc_addon.scene import curves
 
     file = str(folder / "library.blend")
@@ -195,8 +195,8 @@ def written_by_a_script(folder: Path) -> None:
 
 
 def appended(folder: Path) -> None:
-    """Appended hair finds the model that is beside its own file, where Blender tells of it; hair that is made local says
-    where it was looked for, and where it is.
+    """Appended hair finds the model beside its own file, if Blender reports that file; hair that is made local says where the model
+    was looked for, and where it is.
     """
     from dcc_addon.models import model_path
 

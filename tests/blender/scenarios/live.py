@@ -14,7 +14,7 @@ from tests.blender.panel import drawn
 
 
 def sampled_first(_folder: Path) -> None:
-    """In a window the first Live is told to wait, and is no error: the motion is sampled by itself, unless that has failed."""
+    """In a window, the first Live says to wait, and is not an error: the motion is sampled automatically, unless that has failed."""
     from dcc_addon import live
     from dcc_addon.session import session
 
@@ -36,7 +36,7 @@ def sampled_first(_folder: Path) -> None:
 
 
 def rest_is_safe(folder: Path) -> None:
-    """Live off, the add-on off, or a file opened without it: the hair is as it was groomed."""
+    """With Live off, the add-on off, or a file opened without it, the hair is as it was groomed."""
     import dcc_addon
 
     rig = scenes.armature()
@@ -119,7 +119,7 @@ def rendering(folder: Path) -> None:
         rendered[current.frame_current] = values @ matrix[:3, :3].T + matrix[:3, 3]
 
     bpy.app.handlers.frame_change_post.append(place)
-    bpy.app.handlers.render_write.append(look)  # called after all of a frame's other ones
+    bpy.app.handlers.render_write.append(look)  # called after all other handlers of a frame
     scene.frame_set(20)
     bpy.ops.render.render(animation=True)
     bpy.app.handlers.frame_change_post.remove(place)
@@ -127,7 +127,7 @@ def rendering(folder: Path) -> None:
     assert sorted(rendered) == [3, 4, 5]
     for f, points in rendered.items():
         assert apart(points_at(strands, f), points) < SAME
-    # The range was shortened before the render, so it had to sample anew: the run-up of frames 1 and 2 is gone.
+    # The range was shortened before the render, so it had to sample again: the run-up of frames 1 and 2 is gone.
     assert max(apart(rendered[f], shown[f]) for f in shown) > SAME
     rig.pose.bones["head"].rotation_euler[0] += 0.4
     rig.pose.bones["head"].keyframe_insert("rotation_euler", frame=4)
@@ -161,7 +161,7 @@ def two_characters(_folder: Path) -> None:
 
 
 def deformer_added(_folder: Path) -> None:
-    """A modifier that would move live hair a second time is off, whenever it comes, and on again afterwards."""
+    """A modifier that would move live hair a second time is off, whenever it is added, and on again afterwards."""
     rig = scenes.armature()
     scenes.dance(rig)
     strands = scenes.hair(rig, 20)

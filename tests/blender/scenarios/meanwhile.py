@@ -14,9 +14,7 @@ from tests.blender.checks import SAME, apart, baked_points, choose, make_live, m
 
 
 def touched_meanwhile(folder: Path) -> None:
-    """A bake has the look that hair had when it began, whatever slider is moved meanwhile; of hair that is deleted it says
-    so.
-    """
+    """A bake has the look that hair had when the bake began, whatever slider is moved meanwhile; if hair is deleted, it says so."""
     rig = scenes.armature()
     scenes.dance(rig)
     strands, bake = scenes.hair(rig, 20), bpy.ops.neuralocks.bake
@@ -44,7 +42,7 @@ def touched_meanwhile(folder: Path) -> None:
 
 @patch("dcc_addon.operators.base.SAMPLED", 0.0)
 def disabled_meanwhile(folder: Path) -> None:
-    """The add-on is disabled while a bake is at work: it ends, and enabled anew all works."""
+    """The add-on is disabled while a bake is running: the bake ends, and after enabling the add-on again everything works."""
     import dcc_addon
     from dcc_addon.operators.bake import bake_steps
     from dcc_addon.session import session
@@ -65,9 +63,8 @@ def disabled_meanwhile(folder: Path) -> None:
 
 @patch("dcc_addon.operators.base.SAMPLED", 0.0)
 def edited_meanwhile(folder: Path) -> None:
-    """While a bake samples, the artist's frame is shown, a slider is followed at once, and a bone without keys that is turned
-    stays so; the motion is out of date afterwards. Frames are those of the scene that it began in, whichever is shown by
-    then.
+    """While a bake samples, the artist's frame is shown, a slider acts at once, and an unkeyed bone that is turned stays so; the
+    motion is out of date afterwards. Frames are those of the scene that the bake began in, whichever is shown by then.
     """
     from dcc_addon.operators.bake import bake_steps
     from dcc_addon.scene import curves, up_to_date
@@ -135,7 +132,7 @@ def simulated_in_slices(_folder: Path) -> None:
 
 @patch("dcc_addon.scene.body.WEIGHED", 10)
 def weighed_in_steps(_folder: Path) -> None:
-    """The weights of a large body are read in several slices, before the first frame; edited meanwhile, they are read again."""
+    """The weights of a large body are read in several slices, before the first frame; if edited meanwhile, they are read again."""
     from dcc_addon.scene import body
     from dcc_addon.scene.sampling import in_slices
     from dcc_addon.session import session
@@ -171,8 +168,8 @@ def weighed_in_steps(_folder: Path) -> None:
 
 @patch("dcc_addon.background.SLICE", 0.0)
 def posed_without_a_key(_folder: Path) -> None:
-    """A shape key that was turned up, and has no key of that yet, is put back after each slice: no edit that would let
-    sampling begin anew.
+    """A shape key value that was changed but not keyed yet is restored after each slice, which does not count as an edit that
+    restarts sampling.
     """
     from dcc_addon import background
     from dcc_addon.session import session
@@ -198,7 +195,7 @@ def posed_without_a_key(_folder: Path) -> None:
 
 
 def _begun(steps):
-    """The work of an operator, begun as in a window."""
+    """The work of an operator, started as in a window."""
     from dcc_addon.operators import base
     from dcc_addon.session import session
     from neuralocks_core.time_left import TimeLeft

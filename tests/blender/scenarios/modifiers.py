@@ -13,8 +13,8 @@ HAS_USD = getattr(bpy.app.build_options, "usd", False)
 
 
 def deform_among_others(folder: Path) -> None:
-    """Of a tree of one's own that multiplies strands and lets them follow the surface, the live view, and a cache, leave out
-    that the strands follow, and nothing else; all of it comes back, and while the hair is edited, too.
+    """In a user's own tree that multiplies strands and lets them follow the surface, the live view and a cache disable only the
+    following; all of it comes back, also while the hair is edited.
     """
     rig = scenes.armature()
     scenes.dance(rig)
@@ -71,7 +71,7 @@ def deform_among_others(folder: Path) -> None:
     strands.data.use_fake_user, other = True, bpy.data.objects.new("Other", strands.data)
     bpy.context.scene.collection.objects.link(other)
     plain = scenes.surface_deform(strands)
-    make_live(rig, strands)  # which is refused, for the curves are another's, too
+    make_live(rig, strands)  # refused, because the curves are shared
     assert "several objects share" in messages()["Hair"] and strands.data.surface_uv_map == "UVMap"
     bpy.data.objects.remove(other)
     points_at(strands, 9)
@@ -79,7 +79,7 @@ def deform_among_others(folder: Path) -> None:
 
 
 def left_out_of_the_file(folder: Path) -> None:
-    """A bake tells which modifiers are not in its file: those that would play on top of an attached cache, and no others."""
+    """A bake names the modifiers that are not in its file: those that would play on top of an attached cache, and no others."""
     from types import SimpleNamespace
 
     from dcc_addon.operators.bake import NEURALOCKS_OT_bake

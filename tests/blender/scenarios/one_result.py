@@ -91,7 +91,7 @@ def out_of_the_body(folder: Path) -> None:
 
 
 def put_elsewhere(folder: Path) -> None:
-    """A character that is 3 m aside from one frame to the next: its hair feels nothing of the way, live and baked."""
+    """A character jumps 3 m aside from one frame to the next: its hair does not feel the jump, live or baked."""
     from dcc_addon.session import session
 
     rig = scenes.armature()
@@ -114,7 +114,7 @@ def put_elsewhere(folder: Path) -> None:
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "bake.usdc")) == {"FINISHED"}
     for f, points in shown.items():
         assert apart(baked_points(folder / "bake.usdc", "/Character/Hair_Hair", f), points) < SAME
-    # Half a second later what came before the cut would still be felt, but not three metres in a frame.
+    # Half a second later, motion from before the cut would still be felt, but not three metres in a frame.
     assert apart(shown[24] - (3, 0, 0), unmoved[24]) < 0.05
 
 
@@ -162,8 +162,8 @@ def other_frames(folder: Path) -> None:
 
 
 def shutter_at_the_ends(folder: Path) -> None:
-    """A bake knows nothing beyond its frames, where Blender moves the character on; of one that is a frame longer, motion
-    blur of the first and the last frame is as it is live.
+    """A bake ends with its frames, while Blender moves the character on; in a bake that is a frame longer, motion blur of the first
+    and the last frame is as it is live.
     """
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig, (-5, 30))
@@ -192,7 +192,7 @@ def blender_export(folder: Path) -> None:
 
 
 def leaning(folder: Path) -> None:
-    """Whether an armature object leans or its hips do, the hair is the same, live, baked and by Blender's own export."""
+    """Whether an armature object leans or its hips do, the hair is the same: live, baked, and through Blender's own export."""
     shown = []
     for joint in (False, True):
         scenes.empty()
@@ -293,7 +293,7 @@ def scaled_head(folder: Path) -> None:
 
 
 def shipped_shot(folder: Path) -> None:
-    """The shipped shot, put together in Blender by the script of the pictures, moves as a bake of its stage does."""
+    """The shipped shot, built in Blender by the script of the pictures, moves as a bake of its stage does."""
     from examples import blender_shot
     from usd.baking.bake import bake
 

@@ -26,8 +26,8 @@ FRAMES = 1001, 1010, 1020
 
 
 def keyed_in_a_shot(folder: Path) -> None:
-    """Hair keys baked in a shot with animation of its own play after it is opened again, those of the library are silent, and
-    so they stay when the shot's are removed.
+    """Hair keys baked in a shot with its own animation play after it is reopened; those of the library are muted, and stay so when
+    the shot's are removed.
     """
     rig = _keyed_library(folder)
     assert [track.name for track in rig.animation_data.nla_tracks] == TRACKS
@@ -61,8 +61,8 @@ def keyed_in_a_shot(folder: Path) -> None:
 
 
 def keys_of_a_library(folder: Path) -> None:
-    """Hair keys from the library are muted where they cannot be removed, until the character is local; a star there, which
-    Blender brings back, is refused.
+    """Hair keys from the library are muted if they cannot be removed, until the character is local; a solo there, which Blender
+    brings back, is refused.
     """
     _keyed_library(folder)
     rig = _overridden(folder)
@@ -88,8 +88,8 @@ def keys_of_a_library(folder: Path) -> None:
 
 
 def cached_in_a_shot(folder: Path) -> None:
-    """A cache that hair has from its library, taken off in a shot, stays off when the shot is opened again, as does one that
-    the shot gave the hair instead; what moves the hair without it is on.
+    """A cache that hair has from its library, removed in a shot, stays off when the shot is reopened, as does one that the shot
+    gave the hair instead; what moves the hair without it is on.
     """
     needs_usd()
     rig = scenes.armature()

@@ -25,7 +25,7 @@ def particles(_folder: Path) -> None:
     away = np.linalg.norm(points - [0, 0, 1.6], axis=2)
     assert np.abs(away[:, 0] - 0.1).max() < 2e-3 and (away[:, -1] > 0.25).all()
 
-    # In the middle of a rig's dance the hair is found as it is at rest.
+    # Even in the middle of a rig's dance, the hair is converted as it is at rest.
     rig = scenes.armature()
     scenes.dance(rig, (-8, 24))
     skinned = bpy.data.objects.new("Skinned", ball.data.copy())
@@ -44,8 +44,8 @@ def particles(_folder: Path) -> None:
 
 
 def particle_systems(_folder: Path) -> None:
-    """Of several particle systems one after the other is converted, whole and with its children as they are rendered,
-    however few of them the viewport shows; what emits no hair is passed over.
+    """Several particle systems are converted one after the other, whole and with their children as rendered, however few of them
+    the viewport shows; systems that emit no hair are skipped.
     """
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
     ball, scene, convert = bpy.context.active_object, bpy.context.scene, bpy.ops.neuralocks.from_particles
@@ -81,7 +81,7 @@ def particle_systems(_folder: Path) -> None:
 
 
 def simulated_particles(_folder: Path) -> None:
-    """Particle hair that a simulation of its own has moved is converted as it was groomed."""
+    """Particle hair that its own simulation has moved is converted as it was groomed."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
     ball, scene = bpy.context.active_object, bpy.context.scene
     ball.modifiers.new("Hair", "PARTICLE_SYSTEM")
@@ -99,8 +99,8 @@ def simulated_particles(_folder: Path) -> None:
 
 
 def particles_under_shapes(_folder: Path) -> None:
-    """Particle hair is the same groom whatever its scalp's shape keys, that keys or drivers move, are in the frame; on those
-    that are always on it lies as they are, be they keyed so.
+    """Particle hair is the same groom whatever values its scalp's animated shape keys have in the frame; it lies on the shape of
+    those that are always on, even if they are keyed so.
     """
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
     ball, scene = bpy.context.active_object, bpy.context.scene
@@ -135,8 +135,8 @@ def particles_under_shapes(_folder: Path) -> None:
 
 
 def particle_looks(_folder: Path) -> None:
-    """Converted hair has the material of its slot and is as thick as it was drawn; it belongs to the armature that moves
-    what it grows on, whoever is shown, and is found with it.
+    """Converted hair has the material of its slot and is as thick as it was drawn; it belongs to the armature that moves what it
+    grows on, whichever is shown, and is found with it.
     """
     scene, rig, other = bpy.context.scene, scenes.armature(), scenes.armature("Other")
     skin = scenes.body(rig)

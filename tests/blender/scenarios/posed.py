@@ -61,8 +61,8 @@ def posing(folder: Path) -> None:
 
 
 def skin_posed(folder: Path) -> None:
-    """Hair is kept out of skin as it is posed by hand, on whatever bone it hangs, at once and in all frames once Blender was
-    idle; but hair bones that are live move no other hair.
+    """Hair is kept out of skin posed by hand, whatever bone it is attached to, at once, and in all frames once Blender was idle;
+    but live hair bones do not move other hair.
     """
     from dcc_addon import background
     from dcc_addon.session import session
@@ -102,9 +102,7 @@ def skin_posed(folder: Path) -> None:
 
 
 def not_keyed(_folder: Path) -> None:
-    """A value that keys write, and that was changed and is not keyed yet, stays when the motion is sampled, whatever it is a
-    value of.
-    """
+    """An animated value that was changed and is not keyed yet stays when the motion is sampled, whatever kind of value it is."""
     rig, lists = scenes.armature(), bpy.data
     skin, strands = scenes.body(rig), scenes.hair(rig, 5)
     bpy.context.scene.neuralocks.armature = rig
@@ -158,8 +156,8 @@ def moved_hair(folder: Path) -> None:
 
 
 def far_from_the_origin(_folder: Path) -> None:
-    """Single precision, in which poses are kept, is coarse there, in a scene of centimetres 20 m away: what nobody edited is
-    up to date, and an edit is noticed.
+    """Single precision, in which poses are stored, is coarse 20 m away in a scene of centimetres: what nobody edited is still up to
+    date, and an edit is noticed.
     """
     from dcc_addon.scene.up_to_date import ensure
     from dcc_addon.session import session

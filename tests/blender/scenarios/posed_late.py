@@ -16,8 +16,8 @@ FRAMES = (3, 9, 20, 12)
 
 
 def posed_late(folder: Path) -> None:
-    """Live hair stays on a head that such a script moves, by bones without keys, by keyed ones, or by what a constraint
-    looks at, wherever on Blender's list it is and whenever it came there, and is what a bake gives.
+    """Live hair stays on a head that such a script moves, by unkeyed bones, by keyed ones, or by a constraint's target, wherever
+    the script is on Blender's list and whenever it was added, and equals a bake.
     """
     from dcc_addon.session import session
 
@@ -48,8 +48,8 @@ def posed_late(folder: Path) -> None:
 
 
 def rendered_late(folder: Path) -> None:
-    """Blender renders a rig that is posed late otherwise than it shows it, which is told, once; where the script poses it
-    before the frame is evaluated all is well.
+    """Blender renders a rig that is posed late differently from how it shows it, which is reported once; if the script poses it
+    before the frame is evaluated, all is well.
     """
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)
@@ -82,7 +82,7 @@ def _target(scene, *_) -> None:
 
 
 def _looked_at():
-    """What the spine turns as; keyed, so that each frame begins with another turn than the script gives it."""
+    """What the spine follows; keyed, so that each frame begins with another rotation than the script gives it."""
     target = bpy.data.objects.new("Target", None)
     bpy.context.scene.collection.objects.link(target)
     target.keyframe_insert("rotation_euler", frame=1)
@@ -91,7 +91,7 @@ def _looked_at():
 
 @contextmanager
 def _called(function, place: int, when: str = "post"):
-    """Meanwhile Blender calls a function at each frame change, at a place of its list."""
+    """In this block, Blender calls a function at each frame change, at a place in its list."""
     calls = getattr(bpy.app.handlers, f"frame_change_{when}")
     calls.insert(place, function)
     try:

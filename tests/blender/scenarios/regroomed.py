@@ -14,8 +14,8 @@ from tests.blender.checks import MODEL, apart, baked_points, choose, make_live, 
 
 
 def other_strands(folder: Path) -> None:
-    """Live hair that is given other curves, or more or fewer strands, is that hair at once, and the curves that it had get
-    their rest shape back; live goes on when an editing mode is left.
+    """Live hair that gets other curves, or more or fewer strands, shows them at once, and its former curves get their rest shape
+    back; live resumes when an editing mode is left.
     """
     from dcc_addon.operators.bake import bake_steps
     from dcc_addon.scene import curves
@@ -66,9 +66,7 @@ def other_strands(folder: Path) -> None:
 
 
 def replaced_model(folder: Path) -> None:
-    """A model file that is written anew, by another training say, is what live hair is moved by from the next frame on, as
-    a bake would be.
-    """
+    """A model file that is rewritten, for example by another training, moves live hair from the next frame on, as it would a bake."""
     rig = scenes.armature()
     scenes.dance(rig)
     strands, model = scenes.hair(rig, 20), folder / "mine.neuralocks"
@@ -89,8 +87,8 @@ def replaced_model(folder: Path) -> None:
 
 
 def applied(_folder: Path) -> None:
-    """What is applied to the points of live hair is applied to its rest shape: as it would be with Live off, and nothing
-    moves meanwhile. What cannot be is told, and Live is off then.
+    """What is applied to the points of live hair is applied to its rest shape: as it would be with Live off, and nothing moves
+    meanwhile. What cannot be applied is reported, and Live is off then.
     """
 
     def groomed(live: bool, change):
@@ -151,7 +149,7 @@ def applied(_folder: Path) -> None:
 
 
 class _Returned:
-    """A generator to loop over; `value` is what it returned."""
+    """Loops over a generator; `value` is what it returned."""
 
     def __init__(self, steps):
         self._steps, self.value = steps, None

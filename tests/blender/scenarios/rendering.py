@@ -22,7 +22,7 @@ def rendered(folder: Path) -> None:
     scenes.dance(rig)
     tail = rig.pose.bones["hair.02"]
     tail.rotation_mode = "QUATERNION"
-    for frame in (1, 24):  # as a key on the whole character leaves it
+    for frame in (1, 24):  # as with a key on the whole character
         tail.keyframe_insert("rotation_quaternion", frame=frame)
     strands, scene = scenes.hair(rig, 20), bpy.context.scene
     make_live(rig, strands)
@@ -65,8 +65,8 @@ def rendered(folder: Path) -> None:
 
 
 def view_layers(folder: Path) -> None:
-    """A character that one of two view layers excludes: whichever is in view, it is drawn, baked and rendered the same, by
-    a farm and through another scene, too; where both exclude it, that is told.
+    """A character that one of two view layers excludes: whichever is in view, it is drawn, baked and rendered the same, also by a
+    farm and through another scene; if both exclude it, a message says so.
     """
     from dcc_addon.scene.layers import graph_of
     from dcc_addon.session import session
@@ -132,8 +132,8 @@ def view_layers(folder: Path) -> None:
 
 
 def motion_blur(folder: Path) -> None:
-    """Renderers take live hair for deformed, so they ask for it within the shutter, and get what is shown there; nothing
-    is left on it afterwards, nor in a file that is saved meanwhile.
+    """Renderers take live hair as deformed, so they ask for it within the shutter, and get what is shown there; nothing is left on
+    it afterwards, nor in a file saved meanwhile.
     """
     rig = scenes.armature()
     scenes.dance(rig)
@@ -165,7 +165,7 @@ def motion_blur(folder: Path) -> None:
 
 def by_parts(folder: Path) -> None:
     """A file is rendered in parts, as render farms do, and through the compositor of another scene, by a Blender that has
-    just opened it: the hair is that of the whole in all of them; of hair that cannot move the console says so.
+    just opened it: in all parts the hair is that of the whole; if hair cannot move, the console says so.
     """
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)
@@ -235,7 +235,7 @@ def through_strip(folder: Path) -> None:
 
 
 def _compose(scene, other) -> None:
-    """Take another scene's layer into the compositor of a scene."""
+    """Use another scene's layer in the compositor of a scene."""
     if hasattr(scene, "compositing_node_group"):
         tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositing", "CompositorNodeTree")
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")

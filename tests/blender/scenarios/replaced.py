@@ -13,9 +13,7 @@ from tests.blender.checks import MODEL, SAME, apart, make_live, messages, points
 
 
 def later_groom(folder: Path) -> None:
-    """A groom that is appended under the name of one that was deleted, with as many strands, is what is shown from then
-    on.
-    """
+    """A groom that is appended under the name of a deleted one, with as many strands, is shown from then on."""
     expected, file = [], str(folder / "groom.blend")
     for length in (0.4, 0.2):
         scenes.empty()
@@ -42,7 +40,7 @@ def later_groom(folder: Path) -> None:
 
 
 def exchanged(_folder: Path) -> None:
-    """Two live hairs exchange their names, and their curves: each goes on moving, at once, and both come to rest."""
+    """Two live hairs swap names, and curves: each keeps moving, at once, and both come to rest."""
     rig = scenes.armature()
     scenes.dance(rig)
     first, second = scenes.hair(rig, 20), scenes.hair(rig, 20, length=0.4, name="Other")
@@ -67,8 +65,8 @@ def exchanged(_folder: Path) -> None:
 
 
 def converted(_folder: Path) -> None:
-    """Live hair that is converted to a mesh is told to be none any more, and comes to no harm; a chosen body that is
-    converted to curves is passed over.
+    """For live hair that is converted to a mesh, a message says that it is no longer hair, and it is not damaged; a chosen body
+    that is converted to curves is ignored.
     """
     if bpy.app.version < (3, 5):
         raise SkipTest("older ones convert no hair")
@@ -78,7 +76,7 @@ def converted(_folder: Path) -> None:
     strands, operators = scenes.hair(rig, 20), bpy.ops.neuralocks
     rig.neuralocks_character.body = skin
     make_live(rig, strands)
-    skin.data.clear_geometry()  # of faces no curve is made
+    skin.data.clear_geometry()  # faces do not become curves
     skin.data.from_pydata([(0, 0, 0), (0, 0, 1)], [(0, 1)], [])
     for thing, kind in ((skin, "CURVE"), (strands, "MESH")):
         for each in bpy.data.objects:

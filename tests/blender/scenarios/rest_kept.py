@@ -17,8 +17,8 @@ from tests.blender.checks import MODEL, SAME, apart, baked_points, choose, make_
 
 
 def applied_to_other_points(_folder: Path) -> None:
-    """A modifier that multiplies or resamples strands, applied to live hair or lost in a conversion: Live is off then and it
-    is told, as often as it is done; undone, the hair and its modifier are as before.
+    """A modifier that multiplies or resamples strands is applied to live hair or lost in a conversion: Live goes off and says so,
+    every time; after an undo, the hair and its modifier are as before.
     """
     for tree in (_children, _frizz):
         for done in (_apply, _convert):
@@ -35,7 +35,7 @@ def applied_to_other_points(_folder: Path) -> None:
             updates = bpy.app.handlers.depsgraph_update_post
             updates.remove(on_update)
             done()
-            bpy.ops.ed.undo_push(message="done")  # which Blender does before it tells of it
+            bpy.ops.ed.undo_push(message="done")  # Blender does this before it calls handlers
             updates.append(on_update)
             strands.update_tag()
             bpy.context.view_layer.update()
@@ -54,7 +54,7 @@ def applied_to_other_points(_folder: Path) -> None:
 
 
 def strands_after_a_modifier(_folder: Path) -> None:
-    """Strands that are added to live hair from which a modifier was removed before are no work of that modifier."""
+    """Strands that are added to live hair after a modifier was removed are not taken as that modifier's work."""
     rig = scenes.armature()
     scenes.dance(rig)
     strands = scenes.hair(rig, 20)
@@ -76,8 +76,8 @@ def strands_after_a_modifier(_folder: Path) -> None:
 
 
 def attribute_gone(_folder: Path) -> None:
-    """Live hair goes on as before, and has its groom, when the attribute is removed, renamed or converted by hand, or by a
-    modifier that is applied.
+    """Live hair continues, and has its groom, when the attribute is removed, renamed or converted by hand, or by an applied
+    modifier.
     """
     rig = scenes.armature()
     scenes.dance(rig)
@@ -119,8 +119,8 @@ def attribute_gone(_folder: Path) -> None:
 
 
 def exported_by_blender(folder: Path) -> None:
-    """Blender's own exporter writes live hair as it is shown, and its rest shape beside it: a bake moves that, and no hair
-    twice.
+    """Blender's own exporter writes live hair as it is shown, and its rest shape with it: a bake moves the rest shape, so no hair
+    moves twice.
     """
     needs_usd()
     from usd.baking.bake import bake

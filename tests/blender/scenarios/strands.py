@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What strands hang on."""
+"""What strands are attached to."""
 
 from pathlib import Path
 from unittest import SkipTest
@@ -11,7 +11,7 @@ from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, me
 
 
 def control_rig(folder: Path) -> None:
-    """Hair on the head bone of a rig that another one copies, wherever the two stand."""
+    """Hair on the head bone of a rig that copies another one, or on that other one's, moves the same."""
     control = scenes.armature("Control")
     scenes.dance(control, (-8, 24))
     rig = scenes.armature("Deform")
@@ -37,7 +37,7 @@ def control_rig(folder: Path) -> None:
 
 def ways_of_parenting(folder: Path) -> None:
     """Hair parented to the armature, to its head bone or to what is parented to that, constrained to the bone, or grown
-    on a deformed surface moves in the same way, also where the first frame is no rest pose.
+    on a deformed surface moves in the same way, also if the first frame is not a rest pose.
     """
     rig = scenes.armature()
     skin = scenes.body(rig)
@@ -93,9 +93,9 @@ def ways_of_parenting(folder: Path) -> None:
 
 
 def riding(folder: Path) -> None:
-    """A beard that hangs on the jaw rides on it, live and in bakes, also where the artist poses the jaw by hand. Hair that keys
-    of its own move is told of, for it stays on the head; none that hangs on the head, on what carries all of the body, or
-    stands still is.
+    """A beard attached to the jaw rides on it, live and in bakes, also when the artist poses the jaw by hand. Hair that its own
+    keys move gets a note, because it stays on the head; hair attached to the head or to what carries the whole body, or that stands
+    still, does not.
     """
     from dcc_addon.session import session
 
@@ -144,8 +144,8 @@ def riding(folder: Path) -> None:
 
 
 def new_hair(folder: Path) -> None:
-    """Hair as Blender adds it, with the modifier of its own that moves it on its surface: that rests while hair is live,
-    which is as it is baked.
+    """Hair as Blender adds it, with its own modifier that moves it on its surface: the modifier is off while hair is live, and live
+    hair equals a bake.
     """
     rig = scenes.armature()
     skin = scenes.body(rig)

@@ -22,12 +22,12 @@ from tests.blender.checks import (
 
 FRAMES = (2, 13, 24)
 HALF = 2e-4
-"""What the scales of a SkelAnimation, of half precision, are off on a head [m]."""
+"""Error of a SkelAnimation's half-precision scales on a head [m]."""
 
 
 def stretched(folder: Path) -> None:
-    """Hair stays where its head carries it, live, baked, exported by Blender, and posed by hand, whatever is stretched below,
-    or the head itself is, with or without inheriting it.
+    """Hair stays where its head carries it, live, baked, exported by Blender, and posed by hand, whatever is stretched below it, or
+    if the head itself is stretched, with or without inheriting the scale.
     """
     from dcc_addon.session import session
 
@@ -94,8 +94,8 @@ def _as_exported(shot: Path, strands, shown) -> None:
 
 
 def stretched_head_of_bones(folder: Path) -> None:
-    """Hair bones below a head of three scales: muted keys turn them as their own channels do, and exported they are where
-    they are live.
+    """Hair bones below a head with three different scales: muting the keys leaves them as their own channels turn them, and
+    exported they are where they are live.
     """
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.body(rig)
@@ -129,8 +129,8 @@ def stretched_head_of_bones(folder: Path) -> None:
 
 
 def stretched_limb(_folder: Path) -> None:
-    """Below an arm that is stretched, a hand that inherits none of it stays near to where Blender draws it, however far the
-    arm is stretched; a mirrored prop in that hand keeps nobody from sampling.
+    """Below a stretched arm, a hand that inherits none of the stretch stays near to where Blender draws it, however far the arm is
+    stretched; a mirrored prop in that hand does not prevent sampling.
     """
     from dcc_addon.services.axes import to_core
     from dcc_addon.session import session

@@ -19,8 +19,8 @@ from tests.blender.panel import drawn
 
 
 def training(folder: Path) -> None:
-    """Train: in another process, its model goes to the hair that it was trained for, and is named beside this file; a second
-    one at once is refused, and no exported character stays behind.
+    """Train in another process: the model goes to the hair that it was trained for, and is named relative to this file; a second
+    training at the same time is refused, and no exported character stays behind.
     """
     from dcc_addon.models import model_path
 
@@ -38,8 +38,8 @@ def training(folder: Path) -> None:
 
 
 def notes_of_a_training(folder: Path) -> None:
-    """What training says of the character is in the panel from its beginning on, of the artist's objects, and stays there when
-    it has ended, until the next one.
+    """Training's notes on the character are in the panel from its start, with the names of the artist's objects, and stay there
+    after it has ended, until the next one.
     """
     from dcc_addon.operators import training as operator
     from dcc_addon.session import session
@@ -60,8 +60,8 @@ def notes_of_a_training(folder: Path) -> None:
 
 
 def training_leaves_nothing(folder: Path) -> None:
-    """Neither a cancelled nor a failed one leaves what it has made, and a full disk is a line, not a traceback. What lies
-    beside a model of the next name is another's.
+    """Neither a cancelled nor a failed training leaves files, and a full disk gives a line, not a traceback. Files beside a model
+    of the next name belong to another training and stay.
     """
     from dcc_addon.operators import training as operator
 
@@ -94,7 +94,9 @@ def training_leaves_nothing(folder: Path) -> None:
 
 
 def trained_in_two_blenders(folder: Path) -> None:
-    """Two that train for characters of one name, beside files in one folder, write two models; what is not begun keeps no name."""
+    """Two Blenders that train for characters of the same name, with files in one folder, write two models; a training that does not
+    start reserves no name.
+    """
     from dcc_addon.operators import training as operator
 
     with patch.object(operator, "TrainingJob", side_effect=NeuralocksError("no memory")):
@@ -104,7 +106,7 @@ def trained_in_two_blenders(folder: Path) -> None:
             assert "no memory" in str(error)
     assert not list(folder.glob("*.training"))
     _in_training(folder)
-    other, operator._running[:] = operator._running[:], []  # as of another Blender
+    other, operator._running[:] = operator._running[:], []  # as if of another Blender
     strands = _in_training(folder)
     assert _ended() == ("Hair: trained", True) and strands.neuralocks_hair.model == "//Hair_2.neuralocks"
     operator._running[:] = other
@@ -113,8 +115,8 @@ def trained_in_two_blenders(folder: Path) -> None:
 
 
 def training_meanwhile(folder: Path) -> None:
-    """What is trained for may be renamed meanwhile, or deleted, and another file opened, whose hair of the same name gets
-    nothing: then it is told where the model is. Names may be longer than those of files.
+    """The object trained for may be renamed or deleted meanwhile, or another file opened, whose hair of the same name gets nothing:
+    then a message says where the model is. Names may be longer than file names may.
     """
     from dcc_addon.operators import training as operator
 
@@ -142,7 +144,7 @@ def training_meanwhile(folder: Path) -> None:
 
 
 def trained_in_a_shot(folder: Path) -> None:
-    """The model of overridden hair is found, also where its own file names one by the same words beside itself."""
+    """The model of overridden hair is found, even if the hair's own file names one by the same relative path."""
     from dcc_addon.models import model_path
     from dcc_addon.operators import training as operator
 
@@ -166,7 +168,7 @@ def trained_in_a_shot(folder: Path) -> None:
 
 
 def remedy_followed(folder: Path) -> None:
-    """The panel learns by itself that a Python which could not train has got what it lacked."""
+    """The panel notices automatically that a Python that could not train now has what it lacked."""
     from dcc_addon.operators import training as operator
     from dcc_addon.services import trainers, training_job
 
@@ -188,7 +190,7 @@ def remedy_followed(folder: Path) -> None:
 
 
 def _told(until) -> str:
-    """What the panel says when it fits, drawn again after each answer only."""
+    """What the panel says when it fits, redrawn only after each answer."""
     from dcc_addon.operators import training as operator
 
     end = time.monotonic() + 60
@@ -199,7 +201,7 @@ def _told(until) -> str:
 
 
 def _in_training(folder: Path, notes=(), before: str = ""):
-    """Hair of a saved file for which a training of a second runs, which copies a model, and does something before."""
+    """Hair of a saved file for which a training runs for a second; it copies a model, and does something first."""
     from dcc_addon.operators import training as operator
     from dcc_addon.services import training_job
 
@@ -233,7 +235,7 @@ def _in_training(folder: Path, notes=(), before: str = ""):
 
 
 def _ended() -> tuple[str, bool]:
-    """What is said at the end of the training that runs, and whether that is good news."""
+    """The message at the end of the running training, and whether it is good news."""
     from dcc_addon.operators import training as operator
     from dcc_addon.session import session
 

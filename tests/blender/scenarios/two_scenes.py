@@ -13,7 +13,7 @@ from tests.blender.checks import apart, make_live, messages, points_at
 
 @patch("dcc_addon.background.SLICE", 0.0)
 def two_windows(_folder: Path) -> None:
-    """Windows show two scenes: the background samples the characters of both, one that is in both only once."""
+    """Windows show two scenes: the characters of both are sampled in the background, one that is in both only once."""
     from dcc_addon import background
     from dcc_addon.scene import curves
     from dcc_addon.session import session
@@ -42,7 +42,7 @@ def two_windows(_folder: Path) -> None:
 
 @patch("dcc_addon.live_strands.at_once", lambda graph: False)
 def arrived_elsewhere(_folder: Path) -> None:
-    """Hair is prepared while another scene comes into view: it moves when its own is shown again, and nothing is wrong."""
+    """Hair is prepared while another scene comes into view: it moves when its own scene is shown again, without errors."""
     from dcc_addon import preparing
     from dcc_addon.scene import curves
     from dcc_addon.session import session

@@ -13,8 +13,8 @@ FRAMES = (2, 12, 20)
 
 
 def rendered_as_edited(_folder: Path) -> None:
-    """A render begins with the motion as it is: after a path has got another shape, bones turn in another mode or rest, and
-    after edits of things on no list, which some frames of the range show.
+    """A render starts from the current motion: after a path's shape, a bone's rotation mode or a rest bone was changed, and after
+    edits that are on no list but show in some frames of the range.
     """
     from dcc_addon import handlers
     from dcc_addon.session import session
@@ -106,7 +106,7 @@ def _turned_in_another_mode_as_a_whole(rig, _) -> None:
 
 
 def _ground(rig):
-    """A ground that the rig is put on later."""
+    """A ground that the rig is later put on."""
     mesh = bpy.data.meshes.new("Ground")
     mesh.from_pydata([(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)], [], [(0, 1, 2, 3)])
     ground = bpy.data.objects.new("Ground", mesh)

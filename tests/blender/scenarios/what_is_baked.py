@@ -17,8 +17,8 @@ from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, po
 
 
 def too_little_hair(folder: Path) -> None:
-    """Hair without strands, or with strands of one point, is refused before anything is sampled, by all that takes long;
-    beside other hair what is empty is left out.
+    """Hair without strands, or with strands of one point, is refused before anything is sampled, by all long operations; if there
+    is other hair, empty hair is left out.
     """
     if "add_curves" not in bpy.types.Curves.bl_rna.functions:
         raise SkipTest("scripts make no curves in this Blender")
@@ -48,8 +48,8 @@ def too_little_hair(folder: Path) -> None:
 
 
 def hidden_in_renders(folder: Path) -> None:
-    """A backup of the groom that no render draws is invisible in the file, with a word; one that cannot be baked stops
-    nothing. Hair whose visibility is keyed is drawn, and so is what is baked alone by choice.
+    """A backup of the groom that no render draws is invisible in the file, with a note; one that cannot be baked does not stop the
+    bake. Hair whose visibility is keyed is drawn, and so is hair that is baked alone by choice.
     """
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)
@@ -85,7 +85,7 @@ def hidden_in_renders(folder: Path) -> None:
 
 
 def numbered_by_name(folder: Path) -> None:
-    """Of hair of two looks each keeps its numbered file, to which other scenes may refer, whatever its sliders say."""
+    """With hair of two looks, each keeps its numbered file, to which other scenes may refer, whatever its sliders say."""
     rig = scenes.armature()
     scenes.dance(rig)
     scenes.hair(rig, 5, name="Scalp").neuralocks_hair.model = MODEL
@@ -125,7 +125,7 @@ def told_of_a_bake(folder: Path) -> None:
 
 
 def _told(operator, **options) -> list[str]:
-    """What an operator of a bake tells besides that it is done."""
+    """What a bake operator reports besides that it is done."""
     with patch("dcc_addon.operators.bake.tell") as tell:
         assert operator(**options) == {"FINISHED"}
     return tell.call_args.args[2]

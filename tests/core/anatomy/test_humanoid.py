@@ -39,7 +39,7 @@ def test_a_limb_goes_on_from_a_joint_given_by_hand():
 
 
 def test_no_joint_is_two_bones_of_a_limb():
-    """Neither a lone `leg`, the upper one by its place, nor a hand of which an elbow is looked for."""
+    """Neither a single `leg`, the upper one by its place, nor a hand for which an elbow is sought."""
     paths, parents = rig(
         "hips\n spine\n  head\n  l_arm\n   l_hand\n  r_arm\n   r_hand\n l_leg\n  x1\n   x2\n r_leg\n  y1\n   y2"
     )
@@ -53,7 +53,7 @@ def test_no_joint_is_two_bones_of_a_limb():
 
 
 def test_tails_that_hang_from_the_neck_are_no_head():
-    """Whatever the order, where the head itself is named in another language."""
+    """Whatever the order, and even if the head itself is named in another language."""
     for outline in (
         "hips\n neck\n  tailL\n   tailL2\n  pony\n   pony2\n  Kopf",
         "hips\n neck\n  Kopf\n  pony\n   pony2\n  tailL",

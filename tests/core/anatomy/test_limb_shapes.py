@@ -59,7 +59,7 @@ Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]])
 
 
 def limbs(joints=JOINTS, turn=None, sides=None) -> dict[str, str]:
-    """What is found of joints whose names are not read, each by our own name for it."""
+    """What is found among joints whose names are not read, each by our own name for it."""
     names = list(joints)
     parents = [names.index(parent) if parent else -1 for parent, _ in joints.values()]
     places = np.array([place for _, place in joints.values()]) @ (np.eye(3) if turn is None else turn).T

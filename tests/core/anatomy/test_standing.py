@@ -13,7 +13,7 @@ UPRIGHT = np.array([[0, 1, 0], [0, 1.6, 0.05], [0.2, 0.1, 0], [-0.2, 0.1, 0]])
 FLAT = UPRIGHT[:, [0, 2, 1]]
 ON_ALL_FOURS = np.array([[0, 1, 0], [0, 1.1, 1], [0.2, 0.1, 0], [-0.2, 0.1, 0]])
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-"""What places joints that count Y as up in a stage that counts Z."""
+"""Places joints with Y up in a stage with Z up."""
 SEATED = np.array([[0, 0.1, 0], [0, 0.7, 0], [0.2, 0.1, 0.9], [-0.2, 0.1, 0.9]])
 
 
@@ -25,7 +25,7 @@ def test_legs_and_trunk_lie(joints, lying):
 @pytest.mark.parametrize("axis", ["x", "z"])
 @pytest.mark.parametrize("angle", range(0, 360, 30))
 def test_by_whatever_angle_parents_turn_a_character_it_stands(axis, angle):
-    """Upside down, too: from there lying is nearer than standing, but no better."""
+    """Upside down, too: from there, lying is nearer than standing, but not better."""
     placed = Rotation.from_euler(axis, angle, degrees=True).as_matrix()
     for humanoid in (Humanoid(NAMED), Humanoid({"hips": 0, "head": 1})):
         found = standing(placed, UPRIGHT, humanoid, np.array([0, 1.0, 0]))
@@ -47,13 +47,13 @@ def test_without_legs_a_level_trunk_may_be_an_animals():
     ],
 )
 def test_a_root_on_the_floor_is_no_upper_end_of_legs(names):
-    """The ways from head and legs meet there in a rig whose thighs hang from its root, or with controls for them."""
+    """The chains from head and legs meet there in a rig whose thighs are children of its root, or that has controls for them."""
     places = {"hips": (0, 0, 0), "head": (0, 1.6, 0), "upper_leg": (0.1, 0.9, 0), "foot": (0.1, 0.08, 0)}
     joints = np.array([places[name.removeprefix("left_").removeprefix("right_")] for name in names])
     joints *= [[-1 if "right" in name else 1, 1, 1] for name in names]
     humanoid = Humanoid({name: joint for joint, name in enumerate(names)})
     assert np.array_equal(standing(Z_UP, joints, humanoid, np.array([0, 0, 1.0])), Z_UP)
     assert lies(joints, humanoid, np.array([0, 1.0, 0])) == (False, "left_upper_leg" in names)
-    # Where the legs are known, they tell that a character was laid down by its parents.
+    # If the legs are known, they show that the parents laid the character down.
     if "left_upper_leg" in names:
         assert np.array_equal(standing(Z_UP, joints, humanoid, np.array([0, 1.0, 0])), np.eye(3))

@@ -19,7 +19,7 @@ KNOWN = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for pa
 @pytest.mark.skipif(not REAL.is_dir(), reason="the shared motion capture is not there")
 @pytest.mark.parametrize("file", ["02_01", "60_01_scaled"])
 def test_with_any_axes_of_its_joints_a_walker_stands(file):
-    """Its skeletons have joints of the trunk at one place, too."""
+    """Its skeletons also have several trunk joints at one place."""
     source = read_bvh(REAL / f"{file}.bvh")
     skeleton, humanoid = source.skeleton, Character(source.skeleton).humanoid
     axes = Rotation.create_group("O").as_matrix()[np.random.default_rng(1).integers(0, 24, len(skeleton.names))]
@@ -38,7 +38,7 @@ def test_with_any_axes_of_its_joints_a_walker_stands(file):
 
 
 def test_one_leg_up_and_one_down_is_no_stand():
-    """Bones of one side may go along an axis of their joints, those of the other against it."""
+    """Bones of one side may point along an axis of their joints, those of the other against it."""
     places = np.array([[0, 1, 0], [0, 1.6, 0], [0.1, 1.8, 0], [-0.1, 0.2, 0.0]])
     humanoid = {"hips": 0, "head": 1, "left_foot": 2, "right_foot": 3}
     assert standing_axis(places, humanoid) is None

@@ -40,7 +40,7 @@ def test_a_jump_and_a_turn_on_the_spot_are_cuts(rate, turned):
 
 @pytest.mark.parametrize("first", [1, 2, 3, -3, -2, -1])
 def test_cuts_near_the_ends_are_found(first):
-    """A bind pose of a frame or two before the action, which starts elsewhere, is usual."""
+    """A bind pose for a frame or two before the action, which starts elsewhere, is common."""
     who, t, joints = walking()
     joints[first:, who.head, 0, 3] += 3
     assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[first]])
@@ -67,7 +67,7 @@ def test_motion_and_damaged_samples_are_no_cuts():
 
 
 def test_stepped_animation_has_no_cuts():
-    """On twos, at a run: every second step stands still, every other one is large."""
+    """Running, on twos: every second step stands still, the others are large."""
     who, t, joints = walking(24)
     joints[:] = joints[np.arange(len(t)) // 2 * 2]
     joints[:, who.head, 0, 3] += 10 * (np.arange(len(t)) // 2 * 2) / 24
@@ -77,7 +77,7 @@ def test_stepped_animation_has_no_cuts():
 
 @pytest.mark.parametrize("short", ["before", "after"])
 def test_a_jump_beside_a_shorter_step_is_as_far_as_it_is(short):
-    """0.6 m in 1/24 s are a cut, 0.6 m/s would not be: what is compared are ways over the jump's own step."""
+    """0.6 m in 1/24 s is a cut, 0.6 m/s would not be: distances are compared over the jump's own step."""
     who = character()
     steps = np.full(20, 1 / 24)
     steps[8 if short == "before" else 10] = 1 / 60
@@ -105,7 +105,7 @@ def test_a_metre_between_samples_far_apart_is_no_cut():
 
 
 def cut_clip():
-    """A character that is put 5 m aside after a second: who, times, joints before, joints after, clip."""
+    """A character that jumps 5 m aside after a second: who, times, joints before, joints after, clip."""
     who, t, joints = walking(rate=30)
     put = joints.copy()
     put[30:, :, 0, 3] += 5
@@ -115,7 +115,7 @@ def cut_clip():
 
 @pytest.mark.parametrize("spec", [rig_spec(True), BoundarySpec()])
 def test_nothing_of_the_way_is_felt(spec):
-    """After a cut what a network reads is that of the part by itself, before it that of the clip without it."""
+    """After a cut, a network reads what it would read of that part alone; before it, what it would read without the cut."""
     who, t, joints, put, clip = cut_clip()
     assert clip.cuts == pytest.approx([1.0])
     sampler, alone = BoundarySampler(spec, who, clip), BoundarySampler(spec, who, clip.parts[1])

@@ -25,7 +25,7 @@ def test_a_further_turn_comes_on_top_of_the_first():
     first, second = 1.2 * FRONT[None], -0.9 * SIDE[None]
     puppet.turn("head", first)
     puppet.turn_further("head", second)
-    puppet.turn_further("tail", second)  # joints that the rig lacks stay
+    puppet.turn_further("tail", second)  # joints that the rig lacks are ignored
     clip = puppet.clip()
     head = clip.joints[0, person().head, :3, :3]
     assert np.allclose(head, (from_vector(second) @ from_vector(first))[0])

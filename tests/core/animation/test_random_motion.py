@@ -9,9 +9,9 @@ from neuralocks_core.animation.random_motion import FOREIGN, KINDS, WILD, random
 from tests.core.rigs import HEAD, person
 
 TURNS = {"shake": 12, "turn": 12, "nod": 12, "bow": 30, "tilt": 12, "hold": 12}
-"""By how much the head turns at least [degrees],"""
+"""How much the head turns at least [degrees]."""
 TRAVELS = {"sway": 0.05, "translate": 0.25, "jump": 0.25, "walk": 0.25, "fall_and_stop": 0.25}
-"""and how far it goes [m]."""
+"""How far it goes at least [m]."""
 
 
 def acceleration(clip):

@@ -58,7 +58,7 @@ def test_she_stands_on_her_feet_with_her_head_up(woman, path):
 @needs_capture
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_each_naming_gives_whole_limbs(path):
-    """No socket without length stands for a thigh or an arm, and both sides are found."""
+    """No socket without length is taken for a thigh or an arm, and both sides are found."""
     source = Character(take(path).skeleton)
     bind = source.skeleton.bind[:, :3, 3]
     for side in ("left", "right"):
@@ -102,7 +102,7 @@ def test_limbs_point_where_the_source_points(woman):
 
 
 def test_retargeting_to_a_turned_rig_turns_the_motion(woman, tmp_path):
-    """A character bound facing another way does the same thing, seen from its own front."""
+    """A character bound facing another way moves the same, seen from its own front."""
     if not FILES:
         pytest.skip("the shared motion capture is not there")
     whole = np.eye(4)
@@ -126,7 +126,7 @@ POSE = {
 
 
 def turned(z, x, y):
-    """Turns about Z, X and Y [degrees], as the file's channels stand."""
+    """Turns about Z, X and Y [degrees], in the order of the file's channels."""
     each = zip(np.radians([z, x, y]), np.eye(3)[[2, 0, 1]], strict=True)
     return np.linalg.multi_dot([from_vector(angle * axis) for angle, axis in each])
 
@@ -167,13 +167,13 @@ BENT = {
     "right_forearm": (0, 0, 50),
     "right_arm": (50, 0, 0),
 }
-"""What tells the hinges of all elbows and knees."""
+"""A motion that reveals the hinges of all elbows and knees."""
 
 
 @pytest.mark.parametrize("up", ["Y", "Z"])
 @pytest.mark.parametrize("axes", [along_x, along_x_mirrored])
 def test_a_person_whose_zero_pose_is_no_pose_stands(woman, tmp_path, axes, up):
-    """Bones may all go along one axis of their joints: turned by nothing, head and feet are at one end then."""
+    """All bones may point along one axis of their joints: with zero turns, head and feet are then at one end."""
     frames = [{}, POSE, BENT, {}]
     expected = retarget(read_bvh(write_bvh(tmp_path / "take.bvh", frames)), woman)
     path = write_bvh(tmp_path / "odd.bvh", frames, axes=axes, turn=Z_UP if up == "Z" else None)
@@ -207,7 +207,7 @@ def test_limbs_that_never_bend_are_not_twisted(woman, tmp_path):
 @pytest.mark.parametrize("zero", ["Y", "Z", "-Y"])
 @pytest.mark.parametrize("up", ["Y", "Z"])
 def test_a_person_may_stand_along_another_axis(woman, tmp_path, up, zero):
-    """In the file, or before a turn of the root only."""
+    """In the file, or only before a turn of the root."""
     frames = [{}, POSE, BENT]
     expected = retarget(read_bvh(write_bvh(tmp_path / "take.bvh", frames)), woman)
     turns = {"Y": np.eye(3), "Z": Z_UP, "-Y": np.diag([-1.0, -1, 1])}

@@ -69,7 +69,7 @@ _NEXT = {"hips": "spine", "spine": "chest", "chest": "neck", "arm": "forearm", "
 
 
 def along_x(part: str) -> np.ndarray:
-    """Axes (3, 3), columns, of a joint whose bone goes along its X; so all bones do where no joint is turned."""
+    """Axes (3, 3), columns, of a joint whose bone goes along its X; so all bones do if no joint is turned."""
     side, _, limb = part.rpartition("_")
     end = _NEXT.get(limb)
     bone = np.array(BONES[f"{side}_{end}" if side else end][1] if end else (0, 1, 0), float)
@@ -102,8 +102,8 @@ def write_bvh(
         path: to write.
         frames: of each frame, turns about Z, X and Y [degrees], in this order, of parts that turn.
         naming: one of NAMINGS.
-        places: of the hips in each frame [cm]; where they are at rest if left out.
-        axes: what each part's joint has as axes (3, 3), columns, in the T-pose; the world's if left out.
+        places: of the hips in each frame [cm]; their rest place if left out.
+        axes: gives each part's joint axes (3, 3), columns, in the T-pose; the world's if left out.
         turn: of the whole take (3, 3).
     """
     if axes or turn is not None:
@@ -141,7 +141,7 @@ def write_bvh(
 
 
 def _in_axes(frame: Mapping, axes: Callable[[str], np.ndarray], turn: np.ndarray) -> dict:
-    """A frame's turns [degrees], in the T-pose's axes, as those of joints that have others."""
+    """A frame's turns [degrees], given in the T-pose's axes, converted for joints that have other axes."""
     world, found = {}, {}
     for part, (parent, _) in BONES.items():
         local = Rotation.from_euler("ZXY", frame.get(part, (0, 0, 0)), degrees=True).as_matrix()
@@ -149,6 +149,6 @@ def _in_axes(frame: Mapping, axes: Callable[[str], np.ndarray], turn: np.ndarray
         here = world[part] @ axes(part)
         above = np.eye(3) if parent is None else world[parent] @ axes(parent)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of two angles whose sum alone is known, one is zero
+            warnings.simplefilter("ignore")  # of two angles of which only the sum is known, one is zero
             found[part] = tuple(Rotation.from_matrix(above.T @ here).as_euler("ZXY", degrees=True))
     return found

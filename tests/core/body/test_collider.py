@@ -42,7 +42,7 @@ def test_limit_keeps_near_points_exact_and_far_points_signed():
 
 
 def test_memory_is_bounded_though_many_points_need_many_triangles(monkeypatch):
-    """From the middle of a ball all triangles are about as far."""
+    """From the middle of a ball, all triangles are about equally far."""
     ball, rng = trimesh.creation.icosphere(subdivisions=3, radius=0.1), np.random.default_rng(4)
     points = rng.normal(0, 1e-5, (200, 3))
     told = Collider(ball.vertices, ball.faces).distance(points)[0]
@@ -61,7 +61,7 @@ def test_memory_is_bounded_though_many_points_need_many_triangles(monkeypatch):
 
 
 def test_points_far_beyond_a_sharp_rim_are_not_inside():
-    """The nearest sample there lies on a face that may look away."""
+    """The nearest sample there is on a face that may face away."""
     cone, rng = trimesh.creation.cone(0.01, 0.1, sections=16), np.random.default_rng(7)
     angle, radius = rng.uniform(0, 2 * np.pi, 2000), rng.uniform(0.05, 0.08, 2000)
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0, 0.004, 2000)], axis=1)

@@ -32,7 +32,7 @@ def test_an_open_bowl_encloses_what_it_goes_round_more_than_half():
 
 
 def test_air_beside_a_crease_is_no_depth():
-    """A sheet folded so far that it cuts through itself: past the fold the nearest face looks away from the air there."""
+    """A sheet folded so far that it cuts through itself: past the fold, the nearest face faces away from the air there."""
     box = trimesh.creation.box((0.2, 0.2, 0.2)).subdivide().subdivide()
     points, inward = box.vertices.copy(), box.vertices[:, 0] > 0.09
     points[inward & (np.abs(points[:, 1]) < 0.04) & (np.abs(points[:, 2]) < 0.04), 0] -= 0.3  # dented through the back
@@ -42,7 +42,7 @@ def test_air_beside_a_crease_is_no_depth():
 
 
 def test_few_points_are_measured_as_many_are():
-    """Those are compared with the triangles in their reach alone, far from these and near, inside and outside."""
+    """Few points are compared only with the triangles in their reach; far and near points, inside and outside."""
     ball = trimesh.creation.icosphere(4, 0.1)
     points = np.random.default_rng(1).uniform(-0.13, 0.13, (200, 3))
     every = proven_distances(ball.vertices, ball.faces, points)

@@ -7,7 +7,7 @@ import pytest
 from neuralocks_core.body.going_in import depths_along
 
 KNOWN = 0.03
-"""Distances are known so far to both sides of the skin [m]."""
+"""Distances are known this far to both sides of the skin [m]."""
 
 
 def measured(points):
@@ -67,7 +67,9 @@ def test_a_strand_does_not_depend_on_those_beside_it():
 
 
 def test_of_two_planes_that_reach_a_vertex_the_nearer_is_its_way_out():
-    """Under a ridge, in by a gentle slope and out by a steep one: what lies right below the steep one leaves by that."""
+    """Under a ridge, a strand goes in by a gentle slope and out by a steep one: what is right below the steep one leaves through
+    it.
+    """
     points = strand([-0.02, -0.05, -0.05, -0.05, -0.02])
     distance, way = np.full((5, 1), np.inf), np.zeros((5, 3, 1))
     distance[0], distance[4] = -0.02, -0.02

@@ -19,7 +19,7 @@ def _part(seed: int, count: int, influences: int, names: str) -> Body:
 
 
 def test_bodies_joined_are_posed_as_each_by_itself():
-    """With other numbers of influences, and blend shapes of which some have one name."""
+    """With different numbers of influences, and blend shapes of which some share a name."""
     parts, shown = [_part(0, 9, 4, "ab"), _part(1, 5, 2, "cb"), _part(2, 7, 3, "")], {"a": 0.5, "b": -1.0, "c": 2.0}
     skinning = np.random.default_rng(3).normal(size=(3, 4, 4))
 

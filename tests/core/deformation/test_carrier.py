@@ -34,9 +34,7 @@ def test_a_uniform_strand_of_24_moves_exactly_with_the_network():
 
 
 def finer_than_the_network(groom, strands):
-    """Which strands (S,) no means of the network's vertices can follow, and how far (P,) [m] own vertices lie beside its
-    polyline.
-    """
+    """Which strands (S,) no means of the network's vertices can follow, and how far (P,) [m] own vertices are from its polyline."""
     strand, own, (arc, length) = groom.strand_of_point, groom.points - ORIGIN, arc_lengths(groom)
     place = arc / np.where(strands.valid, length, 1.0)[strand] * (K - 1)
     fine = weights(strands.rest, own, strand, place)[2] & strands.valid
@@ -59,9 +57,9 @@ def test_rigid_motion_is_carried_exactly(make):
     moves = strands.valid[groom.strand_of_point]
     expected = np.where(moves[:, None], (groom.points - ORIGIN) @ turn.T + shift + ORIGIN, groom.points)
     # The smallest rotation of a segment may differ from the turn by a twist about it: own vertices off the
-    # polyline may end on the other side of it, but as far from it, and a little further for keeping their distance to
-    # each other. Means of the network's vertices follow exactly but for what they leave over, and but for the first
-    # segment, which the network never moves.
+    # polyline may end on the other side of it, but as far from it, and a little farther because they keep their distance to each
+    # other. Means of the network's vertices follow exactly, except for their residual, and except in the first segment, which the
+    # network never moves.
     off = np.linalg.norm(carried - expected, axis=1)
     fine, beside = finer_than_the_network(groom, strands)
     fine = fine[groom.strand_of_point]
@@ -125,7 +123,7 @@ def test_a_bent_coil_stays_a_coil():
 
 
 def test_what_lies_beside_the_line_is_not_torn_where_two_segments_meet():
-    """Own vertices right before and right behind a network vertex at which the line is bent by 60 degrees."""
+    """Own vertices just before and just after a network vertex at which the line is bent by 60 degrees."""
     edges = np.tile(np.float32([[0.01], [0], [0]]), (1, 2))[:, None]
     displacement = np.zeros((1, 3, 3), np.float32)
     displacement[0, 2] = 0.01 * np.array([np.cos(np.pi / 3) - 1, np.sin(np.pi / 3), 0])
@@ -159,7 +157,7 @@ def test_any_strand_keeps_its_lengths_and_its_root():
 
 
 def test_hair_that_gets_its_lengths_back_keeps_its_way():
-    """To its sides a strand that turns is left nearer to where it was moved than lengths alone would leave it."""
+    """Sideways, a turning strand stays nearer to where it was moved than length correction alone would leave it."""
     count, turn = 60, np.linspace(0, 0.5 * np.pi, 59)
     rest = np.linspace(0, 0.25, count)[:, None] * [1.0, 0, 0]
     stretched = 0.25 / 59 * (1 + 0.03 * np.sin(np.linspace(0, 2 * np.pi, 59)))
@@ -175,7 +173,7 @@ def test_hair_that_gets_its_lengths_back_keeps_its_way():
 
 
 def test_what_lies_in_the_clamped_segment_stays_whatever_moves_behind_it():
-    """A corner there, too, though it lies off the network's vertices."""
+    """A corner there, too, although it is off the network's vertices."""
     t = np.linspace(0, 1, 93)
     bow = 0.2 * np.stack([1 - np.cos(t), -np.sin(t), 0 * t], axis=1)
     bow[2, 2] += 3e-4
@@ -221,7 +219,7 @@ def test_facing_turns_both_ways():
 @pytest.mark.parametrize("vertices", [24, 40])
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_placed_groom_is_the_carried_one_placed(vertices, turned):
-    """Whether vertices are the network's own, which are placed and turned from its axes at once, or follow these."""
+    """Whether vertices are the network's own, which are placed and turned from its axes in one step, or follow them."""
     facing = Rotation.from_euler("y", -70, degrees=True).as_matrix() if turned else np.eye(3)
     way = np.linspace(0, 1, vertices)[None, :, None]
     rng = np.random.default_rng(0)

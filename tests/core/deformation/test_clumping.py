@@ -12,7 +12,7 @@ from neuralocks_core.strands.strand_set import StrandSet
 
 LENGTHS = np.array([0.02, 0.1, 0.3, 0.6])
 EACH = 6
-"""Hairs of one length, all tied to each other."""
+"""Number of hairs of each length, all tied to each other."""
 
 
 @pytest.fixture(scope="module")
@@ -43,13 +43,13 @@ def test_a_lock_is_what_ties_join(locks):
 
 
 def test_a_hair_is_as_stiff_as_a_rod_that_is_held_at_one_end(locks):
-    """Its lowest mode is at the first root of cos x cosh x = -1, and x^4 B / L^4 is its stiffness per mass."""
+    """Its lowest mode is at the first root x of cos x cosh x = -1, and x^4 B / L^4 is its stiffness per mass."""
     root = brentq(lambda x: np.cos(x) * np.cosh(x) + 1, 1, 3)
     np.testing.assert_allclose(locks.rod[::EACH], root**4 / LENGTHS**4, rtol=1e-3)
 
 
 def test_a_hair_that_nothing_ties_goes_its_own_way(locks):
-    """Guide hairs may have no neighbour within reach; and a wide lock of next neighbours resists little when it parts."""
+    """Guide hairs may have no neighbour within reach; and a wide lock of direct neighbours resists little when it parts."""
     far = np.arange(6)[:, None, None] * np.array([1.0, 0, 0])
 
     def law(apart):

@@ -37,7 +37,7 @@ def test_distances_near_the_skin_are_those_of_the_sphere(body):
     away /= np.linalg.norm(away, axis=1, keepdims=True)
     depth = rng.uniform(-0.02, 0.008, 3000)
     value, direction = body.distance(((0.1 + depth)[:, None] * away).astype(np.float32))
-    # Exact to a few tenths of a millimetre where hair is pushed to; deeper down a way out is enough.
+    # Exact to a few tenths of a millimetre where hair is pushed to; deeper down, a way out is enough.
     error, near = np.abs(value - depth), depth > -0.006
     assert np.quantile(error[near], 0.99) < 6e-4 and error[near].max() < 1.5e-3 and error.max() < 4e-3
     assert (direction * away).sum(axis=1).min() > 0.987
@@ -55,7 +55,7 @@ def test_moving_skin_is_found_where_it_is():
 
 
 def test_hair_beside_the_head_is_not_below_the_skin_that_it_is_farther_from():
-    """A collar around the head, which begins 17 mm from there: its plane goes on, and the hair would be pushed out of it."""
+    """A collar around the head begins 17 mm from there: its plane continues, and hair would be pushed out of that."""
     ring = np.linspace(0, 2 * np.pi, 65)[:-1]
     rings = np.stack([np.cos(ring), np.sin(ring), 0 * ring], axis=1) * np.linspace(0.118, 0.15, 5)[:, None, None]
     faces = [
@@ -72,7 +72,7 @@ def test_hair_beside_the_head_is_not_below_the_skin_that_it_is_farther_from():
 
 
 def test_what_lies_behind_a_thin_part_is_not_below_its_front():
-    # As thick as a shoulder: what is known of its front reaches down to where its back has long been left.
+    # As thick as a shoulder: distances to its front are known down to where its back is already far.
     slab = trimesh.creation.box((0.3, 0.3, 0.02)).subdivide_to_size(0.015)
     posed = near_body(False, slab).posed(np.eye(4)[None], None, LOW, HIGH)
     rng = np.random.default_rng(5)
@@ -127,7 +127,7 @@ def chords(count=60, seed=6):
 
 
 def test_hair_that_rests_deep_inside_is_left_there(body):
-    """However deep: where nothing is known of the body, hair is not taken for free, and not dragged out."""
+    """However deep: where nothing is known of the body, hair is not taken as free, and not dragged out."""
     before = chords()
     exact, found = EXACT.distance(before)[0], rest_distance(before, body)
     deep = exact < -0.01
@@ -150,12 +150,12 @@ def test_hair_comes_back_to_the_depth_at_which_it_rests(body, rests):
     lowered = around - np.float32(0.004) * away * (np.arange(24) > 2)[:, None]
     after = resolved(lowered, body, clear)
     assert body.distance(lowered)[0].min() < rests - 0.003
-    # Nearer than half a margin is near enough; where a strand has to turn back sharply the rounds do not suffice.
+    # Nearer than half a margin is near enough; where a strand has to turn back sharply, the rounds are not enough.
     assert np.quantile((rests - body.distance(after)[0][:, 2:]).max(axis=1), 0.9) < 0.55 * MARGIN
 
 
 def test_no_strand_is_left_deeper_than_it_was():
-    """Curls in a thin body, where the way out is now to one side and now to the other: they are not made worse."""
+    """Curls in a thin body, where the way out alternates between the sides: they are not made worse."""
     thin = np.float32([1, 1, 0.2])
     body = near_body(True, trimesh.Trimesh(HEAD.vertices * thin, HEAD.faces)).posed(np.eye(4)[None], None, LOW, HIGH)
     edges = np.random.default_rng(8).normal(size=(2000, 23, 3))
@@ -172,7 +172,7 @@ def test_no_strand_is_left_deeper_than_it_was():
 
 @pytest.mark.parametrize("shift", [0.0005, 0.002, 0.01])
 def test_small_violations_make_small_corrections(body, shift):
-    """What is pushed moves by about as much as it was deep: no popping."""
+    """Pushed hair moves by about as much as it was deep: no popping."""
     before = strands(turn=0.0)
     lowered = before.copy()
     lowered[:, 2:] -= np.float32(shift) * before[:, 2:] / np.linalg.norm(before[:, 2:], axis=2, keepdims=True)

@@ -22,7 +22,7 @@ from tests.core.deformation.ball_hair import HEAD, strands
 
 
 def test_a_resolver_serves_clips_in_which_the_same_skin_stands_still():
-    """Another clip of an edited animation, with the results of a resolver of its own, bit for bit."""
+    """Another clip of an edited animation gets the same results as with its own resolver, bit for bit."""
     mesh, person = trimesh.creation.icosphere(subdivisions=2, radius=0.1), rigs.person()
     ball, count = person.skeleton.bind[person.head, :3, 3] + mesh.vertices, len(mesh.vertices)
     body = Body(
@@ -58,7 +58,7 @@ def test_a_resolver_serves_clips_in_which_the_same_skin_stands_still():
 
 
 def test_the_grooms_of_a_head_share_its_grid():
-    """Locks of other places and lengths; another head has its own."""
+    """Locks at other places and of other lengths share it; another head has its own."""
     person, hair = rigs.person(), rigs.straight_hair()
     joint, weight = np.full((len(HEAD.vertices), 1), person.head), np.ones((len(HEAD.vertices), 1))
     clip = Clip(np.array([0.0, 1.0]), np.tile(person.skeleton.bind, (2, 1, 1, 1)))
@@ -71,7 +71,7 @@ def test_the_grooms_of_a_head_share_its_grid():
 
 
 def test_skin_that_a_blend_shape_moves_in_the_clip_does_not_stand_still():
-    """A face that swells by 15 mm pushes the hair on it as far, though no joint moves."""
+    """A face that swells by 15 mm pushes the hair on it as far, although no joint moves."""
     person, out = rigs.person(), HEAD.vertices / np.linalg.norm(HEAD.vertices, axis=1, keepdims=True)
     on_head, origin = np.full((len(out), 1), rigs.HEAD), rigs.bind()[rigs.HEAD, :3, 3]
     body = Body(HEAD.vertices + origin, HEAD.faces, on_head, np.ones((len(out), 1)), {"swollen": 0.015 * out})
@@ -90,7 +90,7 @@ def test_skin_that_a_blend_shape_moves_in_the_clip_does_not_stand_still():
 
 
 def test_hair_that_rests_deep_sinks_no_deeper_where_nothing_is_known_of_the_body():
-    """Half a decimetre below skin that moves no vertex tells that it is inside, and those above lie as they rest."""
+    """Five centimetres below moving skin, no vertex shows that it is inside, and those above lie as they rest."""
     person, origin, count = rigs.person(), rigs.bind()[rigs.HEAD, :3, 3], len(HEAD.vertices)
     body = Body(HEAD.vertices + origin, HEAD.faces, np.zeros((count, 1), int), np.ones((count, 1)))
     around = np.linspace(0, 0.9, 12)
@@ -121,7 +121,7 @@ def test_poses_and_displacements_of_others_are_refused():
 
 
 def pushed(size, nods):
-    """Of a person so many times larger than one: what 1 cm sideways is changed to (60, 24, 3) [m], and the resolver."""
+    """For a person `size` times as large: what 1 cm sideways is changed to (60, 24, 3) [m], and the resolver."""
     mesh, times = trimesh.creation.icosphere(subdivisions=2, radius=0.1), np.arange(3) / 24
     place = np.diag([size, size, size, 1.0])
     bind = place @ rigs.bind() @ np.linalg.inv(place)
@@ -142,7 +142,7 @@ def pushed(size, nods):
 
 @pytest.mark.parametrize("nods", [False, True])
 def test_a_giant_takes_no_more_work_than_a_person(nods):
-    """As large as a character in the wrong unit; its hair is pushed as a person's."""
+    """As large as a character in the wrong unit; its hair is pushed like a person's."""
 
     def nodes(resolver):
         return np.array([resolver._near.head._values.size, resolver._near.box.count])
@@ -156,7 +156,7 @@ def test_a_giant_takes_no_more_work_than_a_person(nods):
 
 
 def test_a_giant_is_measured_at_its_size():
-    """What is asked of the skin of one that is resolved as a person: rough distances, like the exact ones, are in metres."""
+    """A giant is resolved at a person's size, but its rough distances to the skin, like the exact ones, are in metres."""
     resolver = pushed(64, False)[1]
     points = np.float32([[0, 64 * 0.103, 0], [64 * 0.098, 0, 0]])
     rough = resolver.rough_distance(points, resolver.character.skeleton.bind, np.zeros(0))

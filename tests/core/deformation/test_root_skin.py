@@ -19,7 +19,7 @@ SHEAR = np.array([[0.1, 0.2, 0.0], [0.0, 0.3, 0.1], [-0.2, 0.0, 0.1]])
 
 @pytest.fixture
 def character():
-    """A head whose first blend shape moves its skin by a linear map, its second nothing, and its third a foot far below."""
+    """A head: its first blend shape moves the skin by a linear map, the second nothing, and the third a foot far below."""
     person, count = rigs.person(), len(BALL.vertices)
     centre, foot = person.skeleton.bind[person.head, :3, 3], np.array([0, -1.5, 0])
     none, joints = np.zeros_like(BALL.vertices), np.repeat([[person.head], [0]], count, axis=0)
@@ -58,7 +58,7 @@ def on_skin(count=40, mesh=BALL):
 
 
 def test_strands_are_carried_as_their_place_on_the_skin(character):
-    """A linear map moves each place inside a triangle as it says."""
+    """A linear map also moves each place inside a triangle linearly."""
     places = on_skin()
     skin = RootSkin(character, [hair(character, places)], clip(character, [[0, 0, 0], [1, 1, 1]]))
     assert skin.moves
@@ -80,7 +80,7 @@ def test_roots_off_the_skin_follow_in_part(character):
 
 
 def test_hair_is_made_for_the_body_that_it_fits(character):
-    """For one without blend shapes, or for one with those that the animation begins with: each groom of a head for its own."""
+    """For a body without blend shapes, or with those that the animation begins with: each groom of a head for its own."""
     steady, places = clip(character, [[1, 0, 0], [1, 0, 0]]), on_skin()
     plain, shaped = hair(character, places), hair(character, places + places @ SHEAR.T)
     assert not RootSkin(character, [shaped], steady).moves

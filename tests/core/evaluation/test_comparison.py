@@ -29,7 +29,7 @@ def person(points, shapes):
 
 
 def lying_strands(character):
-    """Eight that lie over the head, a little above its skin."""
+    """Eight strands that lie over the head, a little above its skin."""
     turn, down = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None], np.linspace(0.2, 2.0, 12)
     way = np.stack([np.cos(turn) * np.sin(down), np.ones((8, 1)) * np.cos(down), np.sin(turn) * np.sin(down)], axis=-1)
     points = CENTRE + 0.112 * way
@@ -38,7 +38,7 @@ def lying_strands(character):
 
 
 def pushed(frames=10):
-    """Times and world joint transforms of a character that is moved to the side, faster and faster."""
+    """Times and world joint transforms of a character that accelerates to the side."""
     times = np.arange(frames) / 30
     joints = np.tile(rigs.bind(), (frames, 1, 1, 1))
     joints[:, :, 0, 3] += 0.3 * times[:, None] ** 2
@@ -58,7 +58,7 @@ def test_a_body_shaped_by_a_blend_shape_is_simulated_as_one_modelled_so():
 
 
 def test_hair_on_a_head_that_grows_and_shrinks_moves_as_on_one_that_keeps_its_size():
-    """As networks have it, which see no scale."""
+    """As for networks, which do not see scale."""
     character, (times, joints) = person(HEAD.vertices + CENTRE, {}), pushed()
     scaled = joints.copy()
     scaled[:, rigs.HEAD, :3, :3] *= np.linspace(0.8, 1.5, 10)[:, None, None]
@@ -69,7 +69,7 @@ def test_hair_on_a_head_that_grows_and_shrinks_moves_as_on_one_that_keeps_its_si
 
 
 def test_a_reference_is_as_smooth_at_every_rate_as_on_the_solvers_own_clock():
-    """Along straight lines, of the motion and of the answer, a perfect bake had a velocity error of a tenth."""
+    """With linear interpolation of motion and answer, a perfect bake had a velocity error of a tenth."""
     character, strands = person(HEAD.vertices + CENTRE, {}), lying_strands(person(HEAD.vertices + CENTRE, {}))
 
     def swung(times):
@@ -117,7 +117,7 @@ def test_after_a_cut_hair_begins_where_the_part_does_whichever_times_are_wanted(
 
 
 def test_a_shot_that_ends_in_motion_is_felt_to_go_on():
-    """Also before a cut: the solver's clock goes on past the last sample."""
+    """Also before a cut: the solver's clock continues past the last sample."""
     character, times = person(HEAD.vertices + CENTRE, {}), np.arange(24) / 24
     joints = np.tile(rigs.bind(), (24, 1, 1, 1))
     joints[:, :, 0, 3] += times[:, None]

@@ -30,7 +30,7 @@ def test_text_holds_every_number_and_note():
 
 
 def test_of_many_grooms_one_table_tells_mean_and_worst(tmp_path):
-    """Hair in hundreds of prims: nobody reads hundreds of tables, and no picture is as tall."""
+    """Hair in hundreds of prims: nobody reads hundreds of tables, and no picture can be that tall."""
     pytest.importorskip("matplotlib", reason="the extra 'compare' is not installed")
     grooms = {f"/Hair/lock{i}": {"strands": 1 + i % 2, "droop_cm": -float(i), "settling_s": np.nan} for i in range(40)}
     good = {"motion_ratio": 1.05, "tip_correlation": 0.9, "dynamic_frames": 40, "tip_percent": 2.0}

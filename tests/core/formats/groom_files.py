@@ -86,7 +86,7 @@ def write_hair(path, groom, unit=0.01, up="Z", look=None):
         widths = np.repeat(widths, groom.counts)
     color = np.zeros((1, 3), np.float32) if look.color is None else look.color
     clear = np.zeros(1, np.float32) if look.opacity is None else 1 - look.opacity
-    # Segments and points always, and of thickness, transparency and colours what is more than one number.
+    # Segments and points always; thickness, transparency and colours only if they are more than one number.
     each = [(flag, values) for flag, values in ((4, widths * scale), (8, clear), (16, color)) if len(values) > 1]
     flags, first = 3 + sum(flag for flag, _ in each), (float(widths[0] * scale), float(clear[0]), *color[0].tolist())
     header = struct.pack("<4sIIIIfffff88s", b"HAIR", groom.strand_count, len(points), flags, 0, *first, b"")

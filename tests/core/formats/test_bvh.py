@@ -75,7 +75,7 @@ def test_a_joint_may_turn_about_one_axis_only(tmp_path):
 
 
 def test_somebody_stands_a_twentieth_less_high_than_stretched_out(tmp_path):
-    """2.5 m along the bones are 2.4 m of a person in centimetres, who may be a giant."""
+    """2.5 m along the bones are a person of 2.4 m in centimetres, who may be a giant."""
     assert read_bvh(written(tmp_path, TEXT.replace("OFFSET 0 80 0", "OFFSET 0 140 0"))).unit == 0.01
 
 

@@ -190,7 +190,7 @@ def test_a_header_that_was_left_at_zero_says_no_color(folder):
 
 
 def test_thickness_that_is_no_number_is_left_out(folder):
-    """A signalling NaN, of which numpy warns when it is multiplied."""
+    """A signalling NaN, about which numpy warns when it is multiplied."""
     groom = Groom("a", np.random.default_rng(0).normal(0, 0.1, (6, 3)), [3, 3], np.full(6, 1e-4))
     write_hair(folder / "bad.hair", groom)
     content = bytearray((folder / "bad.hair").read_bytes())
@@ -217,7 +217,7 @@ REAL = {
 @pytest.mark.skipif(not DATA.exists(), reason="real grooms are not beside the repository")
 @pytest.mark.parametrize("name", REAL)
 def test_real_files_import(name):
-    """All strands arrive, those of no length are told apart, and the network's view of them is finite."""
+    """All strands arrive, those without length are recognised, and the network's view of them is finite."""
     groom = formats.read(DATA / name)
     strands, vertices = REAL[name]
     assert groom.strand_count == strands
@@ -232,7 +232,7 @@ def test_real_files_import(name):
 
 @pytest.mark.skipif(not DATA.exists(), reason="real grooms are not beside the repository")
 def test_two_versions_of_one_tail_agree():
-    """The binary v3 ponytail is the text v2 one with Z flipped, in another order and partly combed anew."""
+    """The binary v3 ponytail is the text v2 one with Z flipped, in another order and partly recombed."""
     text = formats.read(DATA / "ponytail/hair_tail.tfx", unit=0.003).points.reshape(474, 16, 3)
     binary = formats.read(DATA / "ponytail/ponytail_tail_v3.tfx", unit=0.003).points.reshape(474, 16, 3)
     binary = binary * [1, 1, -1]

@@ -76,7 +76,7 @@ def test_big_endian_files_are_called_so(folder, name):
 
 @pytest.mark.parametrize("name", ["a.hair", "colors.hair", "v3.tfx", "v4.tfx"])
 def test_headers_of_the_other_byte_order_are_called_so(folder, name):
-    """Their numbers are four bytes each, up to what `.hair` files say of themselves in words."""
+    """Their numbers are four bytes each, up to the text in `.hair` files."""
     magic = 4 if name.endswith(".hair") else 0
     words = np.frombuffer(FILES[name][magic:40], "<i4").byteswap().tobytes()
     with pytest.raises(NeuralocksError, match="is written big-endian.*little-endian"):
@@ -93,7 +93,7 @@ def test_packed_files_are_called_so(folder, name, pack):
 
 @pytest.mark.parametrize("name", ["hair.neuralocks", "arrays.npz", "hair.docx"])
 def test_what_is_packed_and_no_groom_is_not_to_be_unpacked(folder, name):
-    """A model, for one, is a zip."""
+    """A model, for example, is a zip."""
     with pytest.raises(NeuralocksError, match="is not a known groom file, by content or by name; give .tfx"):
         formats.read(put(folder, name, b"PK\x03\x04" + bytes(100)))
 
@@ -127,7 +127,7 @@ def test_missing_folder_and_bad_arguments(folder):
 
 
 def _read_bounded(folder, name, content):
-    """Reading either works or raises the users' error, and allocates no more than the file can justify."""
+    """Reading either works or raises the error for users, and allocates no more than the file can justify."""
     path = put(folder, name, bytes(content))
     tracemalloc.start()
     try:

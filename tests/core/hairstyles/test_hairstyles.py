@@ -101,7 +101,7 @@ def test_a_single_strand_grows(style):
 
 
 def test_hair_grows_with_the_head():
-    """On a head three times as large and elsewhere every length is three times as large."""
+    """On a head three times as large, at another place, every length is three times as large."""
     scalp, _ = ball_scalp(0.27, np.array([4.0, -2.0, 1.0]))
     small, large = grow("bob", SCALP, 200), grow("bob", scalp, 200)
     small = (small.points - CENTRE) / 0.09

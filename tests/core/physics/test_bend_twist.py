@@ -45,7 +45,7 @@ def test_transported_frames_turn_the_root_edge_into_each_edge(curls):
 
 
 def test_straight_transport_invents_twist_in_a_curl_and_exact_does_not():
-    """The strain's part along the edge, in the edge's own frame, is twist; a curl that is drawn has none of it."""
+    """The strain's part along the edge, in the edge's own frame, is twist; a drawn curl has none."""
     t = torch.linspace(0, 1, 24, dtype=torch.float64)
     curl = torch.stack([0.03 * torch.cos(19 * t), -0.2 * t, 0.03 * torch.sin(19 * t)], -1)[None]
     uncurled = straight()

@@ -202,7 +202,7 @@ def test_the_kernel_is_normalised_and_ends_smoothly_at_twice_h():
 
 
 def test_the_density_of_many_strands_is_that_of_all_pairs(curls, monkeypatch):
-    """Found by nearness, block by block, with the gradient of each."""
+    """Pairs are found by nearness, block by block, with the gradient of each."""
     generator = torch.Generator().manual_seed(0)
     apart = 0.1 * torch.rand(2, 30, 1, 3, generator=generator, dtype=torch.float64)
     x = (curls[torch.arange(30) % 4] + apart).requires_grad_()
@@ -223,7 +223,7 @@ def test_the_density_of_many_strands_is_that_of_all_pairs(curls, monkeypatch):
 
 
 def test_the_density_of_a_whole_groom_fits_into_memory():
-    """All pairs of 3,000 strands are 62 GB, of 2,000 they are 27."""
+    """All pairs of 3,000 strands take 62 GB, those of 2,000 take 27."""
     roots = 0.2 * torch.rand(2000, 1, 3, generator=torch.Generator().manual_seed(0))
     groom = roots + straight(24, 0.3).float()
     assert volume.density(groom, rods(groom).mass).isfinite().all()

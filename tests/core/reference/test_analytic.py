@@ -118,7 +118,7 @@ def test_pendulum_period():
 
 
 def test_pendulum_decay():
-    """Damping c per mass slows every mode by exp(-c t / 2); what implicit Euler adds shrinks with the step."""
+    """Damping c per mass slows every mode by exp(-c t / 2); the damping that implicit Euler adds shrinks with the step."""
     bare, _, period = swing(0.0, 32)
     damped, _, _ = swing(2.0, 32)
     numerical = envelope_rate(bare, period)
@@ -134,7 +134,7 @@ def test_error_halves_with_the_step():
 
 
 def frequency(values, rate):
-    """Of a swing about zero [Hz]."""
+    """Frequency of a swing about zero [Hz]."""
     cross = np.flatnonzero(np.diff(np.sign(values)))
     at = cross + values[cross] / (values[cross] - values[cross + 1])
     return rate / (2 * np.diff(at).mean())
@@ -158,7 +158,7 @@ def test_free_vibration_of_a_cantilever():
 
 @pytest.mark.parametrize("mode", [0, 1])
 def test_both_modes_of_a_double_pendulum(mode):
-    """A vertex weighs half of its edges: two free ones of masses l and l / 2, on two edges of length l."""
+    """A vertex has half the mass of its edges: two free vertices of masses l and l / 2, on two edges of length l."""
     edge, rate = 0.15, 240
     rest = np.zeros((1, 4, 3))
     rest[0, :, 1] = -edge * np.arange(4)
@@ -174,8 +174,8 @@ def test_both_modes_of_a_double_pendulum(mode):
 
 
 def test_a_strand_whirls_as_a_chain_does():
-    """Hung beside the axis of a head that turns, steadily in the end: each edge points along what gravity and the centrifugal
-    force of all behind it add up to. Neither damping nor Coriolis' force acts on what rests in the head."""
+    """A strand hangs beside the axis of a head that finally turns steadily: each edge points along the sum of gravity and
+    centrifugal force on everything behind it. Neither damping nor Coriolis force acts on what rests in the head."""
     spin, mass = 6.0, np.full(K, EDGE)
     mass[-1] /= 2
     rest = straight([0, -1, 0]) + [0.1, 0, 0]
@@ -192,5 +192,5 @@ def test_a_strand_whirls_as_a_chain_does():
     settled = simulate(rest, head, material={"bend": 0.0, "damping": 12.0}, substeps=16, iterations=20).points[-1, 0]
     np.testing.assert_allclose(settled[:, :2], chain[:, :2], atol=1e-3)
     assert chain[-1, 0] - rest[0, -1, 0] > 0.1
-    # Implicit Euler asks where the axis is a step late, so that hair lags by about that.
+    # Implicit Euler sees the axis a step late, so hair lags by about that.
     assert np.abs(settled[:, 2]).max() < 3 * spin / 480 * chain[-1, 0]

@@ -43,7 +43,7 @@ def test_a_chain_swings_in_its_own_modes(bend):
 
 
 def test_a_chain_without_support_droops_to_the_least_energy():
-    """Level bones that nothing holds, in a plane: the sum of springs and weights by a general minimiser."""
+    """Level bones that nothing supports, in a plane: springs and weights minimised by a general minimiser."""
     chains = chain((0, 0, -BONE))
     material = RigMaterial(bend=5e-2, rest_support=False)
     tree = RodTree(chains, material)
@@ -59,7 +59,7 @@ def test_a_chain_without_support_droops_to_the_least_energy():
 
 
 def test_spring_bones_follow_those_above_them_in_the_same_frame():
-    """The procedure of VRMC_springBone 1.0 on nodes whose bind axes are anything, from the root to the descendants."""
+    """The procedure of VRMC_springBone 1.0 on nodes with arbitrary bind axes, from the root to the descendants."""
     chains, step, settings = chain((0.01, -0.05, -0.02), 4), 1 / 60, SpringSettings(1.3, 0.25, 0.4)
     time, rng = step * np.arange(40), np.random.default_rng(0)
     head = Rotation.from_rotvec(np.stack([0.5 * np.sin(5 * time), 0.8 * np.sin(3 * time), 0.2 * time], axis=1))

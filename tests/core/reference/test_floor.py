@@ -20,7 +20,7 @@ def test_floor_falls_with_history():
 
 
 def test_restarts_measure_rest_on_the_body_at_rest():
-    """Not on the body as it is posed where they begin, which hair would then be pushed to."""
+    """Not on the body as it is posed where they begin, to which hair would then be pushed."""
     rest, head = groom(4, curl=0), shaken(30)
     points, faces = sphere()
     posed = carried(head, points) + np.linspace(0, 0.03, 30)[:, None, None] * [1, 0, 0]
@@ -34,5 +34,5 @@ def test_restarts_measure_rest_on_the_body_at_rest():
 def test_short_clip_is_refused():
     with pytest.raises(NeuralocksError, match="longer"):
         stateless_floor(groom(2), shaken(10), history=20)
-    with pytest.raises(TypeError, match="history"):  # it has no usual length: each model reads its own
+    with pytest.raises(TypeError, match="history"):  # it has no default length: each model reads its own
         stateless_floor(groom(2), shaken(10))

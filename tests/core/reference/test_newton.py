@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The reference beside newton's rods (capsules on elastic joints, solved by vertex block descent): three scenes.
 
-Both are given one kilogram a metre, so that joint stiffness is B / l. They share no code, no unknowns (positions here,
-rigid bodies there) and no solver; what is left between them is mostly numerical damping. Newton's kernels take a minute or
-two to compile, so these run only when asked for: NEURALOCKS_COMPARE=1.
+Both get one kilogram per metre, so that joint stiffness is B / l. They share no code, unknowns (positions here, rigid bodies there)
+or solver; the remaining difference is mostly numerical damping. Newton's kernels take a minute or two to compile, so these run only
+when asked for: NEURALOCKS_COMPARE=1.
 """
 
 import os

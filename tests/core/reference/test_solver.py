@@ -107,7 +107,7 @@ def test_planes_say_where_the_body_is():
 
 
 def test_hair_that_lies_deep_in_the_body_is_known_to_be_there():
-    """Farther below the skin than outside of it hair is taken for free."""
+    """Even farther below the skin than the distance outside at which hair counts as free."""
     points, faces = sphere()
     head = shaken(6)
     straight = np.linspace(0.09, 0.03, 24)[:, None] * [0, 1.0, 0]

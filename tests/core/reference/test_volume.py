@@ -50,7 +50,7 @@ def test_a_bundle_that_is_swung_stays_wider_with_volume():
     angle = 0.9 * np.sin(np.linspace(0, 2 * np.pi, 25))
     head[:, :2, :2] = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], 1).reshape(-1, 2, 2)
     ties = np.stack([np.roll(np.arange(len(rest)), i) for i in (5, 9)], axis=1).astype(int)
-    # Held together far more than grown: ties to strands whose places at rest are taken as one.
+    # Held together much more closely than grown: ties to strands whose rest places count as one.
     drawn = rest * [0.2, 1.0, 0.2] + rest[:, :1] * [0.8, 0.0, 0.8]
 
     def width(volume):

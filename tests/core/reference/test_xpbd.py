@@ -14,7 +14,7 @@ from tests.core.reference.swinging_heads import carried, edge_lengths, groom, sh
 
 
 def test_small_steps_and_newton_agree():
-    """Substeps up, explicit XPBD and implicit Newton tend to one motion: same bend, support, damping, inertia."""
+    """With more substeps, explicit XPBD and implicit Newton converge to one motion: same bend, support, damping, inertia."""
     rest, head = groom(20, curl=0), shaken(30)
     newton = simulate(rest, head, substeps=8, tolerance=1e-5).points
     moved = np.linalg.norm(newton - rest, axis=-1).mean()
@@ -44,7 +44,7 @@ def library(style, strands=24):
 
 @pytest.mark.parametrize("style", ["wavy", "tight_curls", "coils", "afro"])
 def test_curls_come_to_rest(style):
-    """The bends' force has a potential: what turns the frame of a bend is pushed back by it."""
+    """The bending force has a potential: whatever turns the frame of a bend is pushed back by it."""
     rest = library(style)
     head = np.tile(np.eye(4), (75, 1, 1))
     head[:, 0, 3] = 0.03 * np.clip(np.arange(75) / 6, 0, 1)
@@ -66,7 +66,7 @@ def test_curls_tend_to_the_implicit_solution():
 
 
 def test_bind_pose_and_constant_speed():
-    """What is left is the stretch that one pass a substep leaves."""
+    """The only change is the stretch that one pass per substep leaves."""
     rest = groom(8)
     head = np.tile(np.eye(4), (6, 1, 1))
     head[:, 0, 3] = np.arange(6) / 30

@@ -24,7 +24,7 @@ def rig(dynamic=True):
 
 
 def clip(skeleton: Skeleton, joint: str, vectors: np.ndarray, pivot: str) -> Clip:
-    """What hangs from a joint turns by rotation vectors (61, 3) about where another joint is."""
+    """Everything below a joint turns by rotation vectors (61, 3) about the place of another joint."""
     names = [name.rsplit("/", 1)[-1] for name in skeleton.names]
     place = skeleton.bind[names.index(pivot), :3, 3]
     move = np.tile(np.eye(4), (len(TIMES), 1, 1))
@@ -59,7 +59,7 @@ def test_a_hat_that_is_shifted_without_a_turn_carries_its_hair():
 
 @pytest.mark.parametrize("degrees", [0, 0.2])
 def test_a_hat_that_stays_on_the_head_changes_no_bit(degrees):
-    """Up to what files round; the head itself nods."""
+    """Up to the rounding of files; the head itself nods."""
     who, model = rig()
     nods, slips = (
         clip(who.skeleton, "head", NODDING, "head"),
@@ -73,7 +73,7 @@ def test_a_hat_that_stays_on_the_head_changes_no_bit(degrees):
 
 @pytest.mark.parametrize("scale", [0.0, -1.0])
 def test_a_hat_without_a_turn_leaves_its_hair_to_the_head(scale):
-    """It is hidden by a scale of zero, or mirrored."""
+    """The hat is hidden by a scale of zero, or mirrored."""
     who, model = rig()
     motion = clip(who.skeleton, "hat", NODDING, "hat")
     hat = [name.rsplit("/", 1)[-1] for name in who.skeleton.names].index("hat")

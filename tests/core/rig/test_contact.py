@@ -29,7 +29,7 @@ from tests.core.rig.builders import character, tail
 
 RADIUS = 0.12
 CENTRE = np.array([0, 0.05, 0.02])
-"""Of the head's ball, from the head joint."""
+"""Centre of the head's ball, from the head joint."""
 
 
 def on_a_ball() -> HairRig:
@@ -67,7 +67,7 @@ def test_ribbons_that_fall_over_the_head_lie_on_it():
 
 
 def test_contacts_are_the_corners_of_each_joint():
-    """Of a ribbon its four corners before anything else; of a joint without a mesh the bone's end."""
+    """For a ribbon, first its four corners; for a joint without a mesh, the bone's end."""
     rig = on_a_ball()
     contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, 0.01)
     mine = rig.points[rig.weights[:, 1] > 0.5]
@@ -79,7 +79,7 @@ def test_contacts_are_the_corners_of_each_joint():
 
 
 def test_bodies_in_motion_are_those_that_were_met():
-    """Each with what the network reads at that moment."""
+    """Each body with what the network reads at that moment."""
     rig = on_a_ball()
     spec = rig_spec(dynamic=True)
     skinning = np.tile(np.eye(4), (2, len(rig.character.skeleton.names), 1, 1))
@@ -105,7 +105,7 @@ def test_bodies_in_motion_are_those_that_were_met():
 
 
 def test_hair_comes_back_to_where_it_lay_deepest(monkeypatch):
-    """Half of a batch: there the same answer costs more than in new poses; renewed poses are forgotten."""
+    """For half of a batch, where the same answer costs more than in new poses; replaced poses are forgotten."""
     monkeypatch.setattr("neuralocks_core.training.rig.contact.HARD", 16)
     rig = on_a_ball()
     points = np.random.default_rng(0).normal(0, 1, (40, 3))
@@ -123,7 +123,7 @@ def test_hair_comes_back_to_where_it_lay_deepest(monkeypatch):
 
 
 def with_chest(rig: HairRig) -> HairRig:
-    """The same with another ball, for a chest."""
+    """The same rig with another ball, for a chest."""
     who = rig.character
     names = [name.rsplit("/", 1)[-1] for name in who.skeleton.names]
     body = who.body
@@ -135,7 +135,7 @@ def with_chest(rig: HairRig) -> HairRig:
 
 
 def test_twist_of_a_lock_is_seen_and_learned_from():
-    """Turned about their own bones, locks keep the bones' ends; their mesh, and what training compares, tell."""
+    """Locks turned about their own bones keep the bones' ends; their mesh, and what training compares, show the twist."""
     rig = on_a_ball()
     turns = np.broadcast_to(no_turns(rig), (2, len(rig.chains), 4)).copy()
     angle, joint = 1.0, rig.chains.bone_joint[-1]
@@ -153,7 +153,7 @@ def test_twist_of_a_lock_is_seen_and_learned_from():
 
 @pytest.mark.parametrize("away", [0.0, 1.5])
 def test_a_body_out_of_the_hairs_reach_is_none(away):
-    """Shoes alone on the skeleton: nothing is near, and training goes on without a body."""
+    """With only shoes on the skeleton, nothing is near, and training continues without a body."""
     rig = on_a_ball()
     who, body, feet = rig.character, rig.character.body, rig.character.skeleton.names.index("hips")
     joint = who.head if not away else feet
@@ -178,7 +178,7 @@ def test_a_body_out_of_the_hairs_reach_is_none(away):
 
 
 def test_other_bodies_vary_below_the_head():
-    """To which the hair was fitted: whatever a blend shape does there, and all that it moves both by."""
+    """The hair was fitted to the head: what a blend shape does there, and any motion of both, does not vary."""
     rig = with_chest(on_a_ball())
     who, body = rig.character, rig.character.body
     on_head = body.joint_indices[:, 0] == who.head

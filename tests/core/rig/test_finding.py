@@ -15,7 +15,7 @@ from tests.core.rig.builders import character, skin, tail
 
 
 def test_chains_by_name_with_end_joints():
-    """The last joint of each chain drives nothing: it is the end of a bone and does not move."""
+    """The last joint of each chain drives nothing: it is a bone's end and does not move."""
     who = character([*tail("Hair_L", 3), *tail("Hair_R", 2), ("Eye_L", "head", (0.03, 1.6, 0.1))])
     chains = find_chains(who)
     assert chains.names == ("Hair_L_1", "Hair_L_2", "Hair_R_1")
@@ -24,7 +24,7 @@ def test_chains_by_name_with_end_joints():
 
 
 def test_strange_names_are_found_by_what_they_drive():
-    """A subtree that drives only a mesh of its own is hair; the jaw and what drives the body's mesh are not."""
+    """A subtree that drives only its own mesh is hair; the jaw and joints that drive the body's mesh are not."""
     who = character([*tail("J_opt_C_01", 2), *tail("jaw", 2, at=(0, 1.5, 0.1)), *tail("cable", 2, at=(0.1, 1.6, 0))])
     lock = skin(who, {"J_opt_C_01_1": np.eye(3) * 0.1 + [0, 1.6, -0.1]})
     body = skin(who, {"hips": np.eye(3), "head": np.eye(3) + 1, "cable_1": np.eye(3)})
@@ -33,17 +33,17 @@ def test_strange_names_are_found_by_what_they_drive():
 
 
 def test_an_end_joint_may_have_an_end_of_its_own():
-    """FBX exporters add leaf bones to whatever is last: the bone still ends where the rig's own end joint lies."""
+    """FBX exporters add leaf bones to whatever is last: the bone still ends at the rig's own end joint."""
     who = character(tail("hair", 4))
     mesh = skin(who, {"hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})
     chains = find_chains(who, [mesh])
     assert chains.names == ("hair_1", "hair_2")
     assert chains.chain_length(0) == pytest.approx(2 * np.hypot(0.06, 0.01))
-    assert len(find_chains(who)) == 3  # without skin, nothing tells
+    assert len(find_chains(who)) == 3  # without skin, nothing shows it
 
 
 def test_what_names_of_many_conventions_say():
-    """VRoid, Unity, Unreal, 3ds Max, MikuMikuDance, and what artists call hair, faces and what is worn."""
+    """VRoid, Unity, Unreal, 3ds Max, MikuMikuDance, and artists' names for hair, faces and things worn."""
     hair = "J_Sec_Hair1_01 J_L_HairFront_00_SJ hair_01_l Bip001_HairA01 bangs_C_1 PonyTail_L SideLock_R maegami_01 tail_L_01 wig_01 "
     hair += "HairBun_L 前髪_01 左もみあげ 三つ編み1 横毛2 头发01"
     other = "leftEye eye_L brow_tail ear_tuft EarRing_L_02 CatEar_R nekomimi HairRibbon_L hair_clip_L HeadBand Sunglasses horn_L "
@@ -54,7 +54,7 @@ def test_what_names_of_many_conventions_say():
 
 
 def test_features_may_curl_and_lock():
-    """The bake would write over their animation; by ears and on foreheads lies hair."""
+    """The bake would overwrite their animation; but there is hair beside ears and on foreheads."""
     features = "lip_curl_1 tongue_curl_L_2 brow_lock_1 eyeLock_R lash_curl_L"
     assert [name for name in features.split() if says_hair(name) or not says_face(name)] == []
     hair = "curl_1 lock_L_2 ear_lock_L forehead_curl pin_curl_1 brown_curl_1 eye_bangs_L"
@@ -83,7 +83,7 @@ def test_what_says_hair_wherever_it_hangs():
 
 @pytest.mark.parametrize("name", ["hair_group", "head_twist"])
 def test_a_holder_that_drives_nothing_is_no_bone(name):
-    """Whatever its name, with one child as with several: turning it would swing the hair's roots through the skull."""
+    """Whatever its name, and with one child or several: turning it would swing the hair's roots through the skull."""
     holder = (name, "head", (0, 1.6, -0.1))
     who = character([holder, *tail("hair", 3, parent=name)])
     meshes = [skin(who, {"hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})]
@@ -101,7 +101,7 @@ def _steered(leaf, next_leaf=True):
 
 @pytest.mark.parametrize("patterns", [None, ["phys_1"]])
 def test_a_chain_of_controls_with_deforming_joints_beside_them_is_one_chain(patterns):
-    """Each of these by itself would turn about a pivot of its own, and the skin gape."""
+    """As separate chains, each would turn about its own pivot, and the skin would gape."""
     who, skins = _steered("hair")
     chains = find_chains(who, [skin(who, skins)], patterns)
     assert chains.names == ("phys_1", "phys_2", "phys_3") and list(chains.parents) == [-1, 0, 1]
@@ -109,13 +109,13 @@ def test_a_chain_of_controls_with_deforming_joints_beside_them_is_one_chain(patt
 
 
 def test_a_holder_of_pieces_that_do_not_go_on_from_each_other_is_no_bone():
-    """What hangs from the next joint is off its place: a group in a group."""
+    """The next joint's children are not at its place: a group in a group."""
     who, skins = _steered("hair", next_leaf=False)
     assert "phys_1" not in find_chains(who, [skin(who, skins)]).names
 
 
 def test_a_control_of_the_cap_of_the_hair_is_no_bone():
-    """As where the joint drives it itself."""
+    """As if the joint drove the cap itself."""
     who, skins = _steered("hair")
     del skins["hair_1"]
     meshes = [skin(who, skins), _ring(who, "head"), _ring(who, "hair_1")]
@@ -141,7 +141,7 @@ def test_hair_in_compound_and_japanese_names():
     "name", ["リボン", "左耳", "メガネ", "ribbon", "HairPin_L", "BunnyEar_L", "HeadBand", "brow_tail"]
 )
 def test_what_a_head_wears_is_no_hair(name):
-    """In no language, though it has a mesh of its own and an end joint; hair below it is hair by its name."""
+    """In any language, although it has its own mesh and an end joint; hair below it is recognised by its name."""
     who = character([*tail(name, 2), *tail("後ろ毛", 2, parent=f"{name}_1"), *tail("x", 2, parent=f"{name}_1")])
     points = np.eye(3) * 0.1 + [0, 1.6, -0.1]
     meshes = [skin(who, {joint: points}) for joint in (f"{name}_1", "後ろ毛_1", "x_1")]
@@ -149,7 +149,7 @@ def test_what_a_head_wears_is_no_hair(name):
 
 
 def test_a_joint_that_drives_the_cap_of_the_hair_is_no_bone():
-    """Turned, it would take all hair through the forehead: the tails that hang from it move."""
+    """If it turned, it would take all hair through the forehead: only the tails below it move."""
     who = character([("Hair", "head", (0, 1.6, 0)), *tail("Hair", 3, parent="Hair")])
     tails = skin(who, {"Hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "Hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})
     head = _ring(who, "head")
@@ -188,7 +188,7 @@ def _ring(who, joint, size=1.0):
 
 
 def test_a_branching_chain_is_one_chain():
-    """Both branches hang from the joint that forks, and its bones go to both."""
+    """Both branches are children of the forking joint, and its bones go to both."""
     fork = tail("hair_a", 3, at=(0.02, 1.5, -0.1), parent="hair_2") + tail(
         "hair_b", 2, at=(-0.02, 1.5, -0.1), parent="hair_2"
     )

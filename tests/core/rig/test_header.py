@@ -115,7 +115,7 @@ def test_the_example_is_built_by_the_line_that_it_gives(tmp_path):
 
 
 def test_anything_gives_a_bounded_unit_quaternion(tmp_path):
-    """Huge, tiny, infinite numbers and none, in C and in numpy."""
+    """Huge, tiny and infinite numbers and NaN, in C and in numpy."""
     model = random_model()
     export_c(model, tmp_path / "hair.h")
     rng = np.random.default_rng(0)
@@ -146,7 +146,7 @@ def test_features_from_quaternions(tmp_path):
 
 
 def test_names_of_any_alphabet_stay_apart_in_the_header(tmp_path):
-    """Joint names are UTF-8 in C; nothing in a name, whoever made the model, gets out of its literal or comment."""
+    """Joint names are UTF-8 in C; nothing in a name, whoever made the model, escapes its literal or comment."""
     names = ["左髪", "右髪", 'a"b\\', "*/ int x; /*", "**//", "t??/", "n\nl"]
     model = random_model((1,) * len(names))
     reads = {"head": "*/ int y; /*", "neck": "首"}
@@ -162,7 +162,7 @@ int main(void) {
 """
     printed = subprocess.run([compiled(tmp_path, source)], capture_output=True, check=True).stdout.decode()
     assert printed.split("|")[:-1] == names
-    header = (tmp_path / "hair.h").read_text(encoding="ascii")  # which no compiler's code page can misread
+    header = (tmp_path / "hair.h").read_text(encoding="ascii")  # no compiler's code page can misread that
     assert "as they are named in its rig: head __ int y_ __, neck \\u9996\n" in header
 
 
@@ -181,19 +181,19 @@ UNITY, UNREAL = np.diag([-1.0, 1, 1]), np.array([[1.0, 0, 0], [0, 0, 1], [0, 1, 
 
 
 def into(axes, quaternions):
-    """What the header's text makes of rotations: (w, det(E) E v)."""
+    """Rotations converted as the header's text says: (w, det(E) E v)."""
     return np.concatenate([quaternions[..., :1], np.linalg.det(axes) * quaternions[..., 1:] @ axes.T], axis=-1)
 
 
 @pytest.mark.parametrize("engine", [np.eye(3), from_vector(np.array([0.3, 2, 1])), UNITY, UNREAL], ids=str)
 def test_turns_in_other_joint_axes(tmp_path, engine):
-    """An engine of any axes, whose importer gave joints others, gets what a bake writes for such a rig."""
+    """An engine with any axes, whose importer gave joints other axes, gets what a bake writes for such a rig."""
     rows = tail("hair", 4)
     ours, theirs = (find_chains(character(rows, turn=from_vector(np.array(v)))) for v in ([0.3, -1, 0.6], [2.0, 1, 0]))
     model = replace(random_model((3,)), chains=ours)
     export_c(model, tmp_path / "hair.h")
     binds = run_c(compiled(tmp_path, BIND_HARNESS), [], 4)
-    assert (binds[[0, -1]] == [1, 0, 0, 0]).all()  # of joints that are not there
+    assert (binds[[0, -1]] == [1, 0, 0, 0]).all()  # for joints that are not there
     turns = model.evaluate(random_features(model, 20))
     wanted = from_quaternion(ours.turns_on(theirs, turns))
     assert np.abs(from_quaternion(turns) - wanted).max() > 0.1
@@ -207,12 +207,12 @@ def test_turns_in_other_joint_axes(tmp_path, engine):
     text = (tmp_path / "hair.h").read_text()
     assert "turns become (w, x, -y, -z) and (w, -x, y, -z)" in text
     for engine, mirror, signs in ((UNITY, UNITY, [1, 1, -1, -1]), (UNREAL, np.diag([1, -1, 1]), [1, -1, 1, -1])):
-        own = engine.T @ ours.axes[0] @ mirror  # as it was but for the mirror
+        own = engine.T @ ours.axes[0] @ mirror  # as it was except for the mirror
         np.testing.assert_allclose(into(own.T @ engine.T @ ours.axes[0], turns[:, 0]), signs * turns[:, 0], atol=1e-6)
 
 
 def test_rotations_of_other_axes(tmp_path):
-    """The formula and the lines for two engines are what turning and mirroring everything is."""
+    """The formula and the lines for two engines equal turning and mirroring everything."""
     export_c(random_model(), tmp_path / "hair.h")
     text = (tmp_path / "hair.h").read_text()
     q = np.random.default_rng(0).normal(size=(20, 4))
@@ -226,7 +226,7 @@ def test_rotations_of_other_axes(tmp_path):
 
 
 def test_the_header_says_which_way_its_rig_faces(tmp_path):
-    """Axes go by the upper arms: an engine whose character is bound askew feeds what a bake reads once it turns by that angle."""
+    """Axes follow the upper arms: if a character is bound askew, an engine feeds what a bake reads once it turns by that angle."""
     rows = character(tail("hair", 4)).skeleton
     bind = rows.bind.copy()
     bind[rows.names.index("hips/chest/left_upper_arm"), 2, 3] += 0.1

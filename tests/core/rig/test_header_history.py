@@ -71,8 +71,8 @@ def test_of_a_head_that_turns_accelerations_are_felt_in_the_axes_of_a_bake(tmp_p
     ids=["gcc", "gcc fast", "clang fast"],
 )
 def test_one_damaged_frame_does_not_stay_in_the_history(tmp_path, compiler, options):
-    """A position beyond any world, or none at all, is felt as a jump and forgotten when the history has passed, also where
-    the compiler was told that there are no infinities; a damaged time is not heard."""
+    """An absurd position, or NaN, is felt as a jump and forgotten when the history has passed, even if the compiler was told that
+    there are no infinities; a damaged time is ignored."""
     export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
     program = compiled(tmp_path, HISTORY_HARNESS, ("-O2", *options), compiler)
     for damaged in (1e30, -3.4e38, np.inf, np.nan):
@@ -84,14 +84,14 @@ def test_one_damaged_frame_does_not_stay_in_the_history(tmp_path, compiler, opti
         assert np.abs(felt[200:]).max() < 1e-5, damaged
         rows[60], rows[60, 0] = rows[59], damaged
         assert np.abs(run_c(program, rows, felt.shape[1])).max() < 1e-5, damaged
-        rows[60], rows[60, 4:] = rows[59], damaged  # a rotation, taken for another turn at most
+        rows[60], rows[60, 4:] = rows[59], damaged  # a rotation, at most taken for another turn
         rows[60, 0] += 1 / 60
         assert np.isfinite(felt := run_c(program, rows, felt.shape[1])).all(), damaged
         assert np.abs(felt[200:]).max() < 1e-5, damaged
 
 
 def test_the_header_passes_on_no_more_of_a_teleport_and_of_a_spin_than_the_bake(tmp_path):
-    """0.2 m from one frame to the next are 18 g, of which 6 are felt; of 60 rad/s 25 are."""
+    """0.2 m from one frame to the next is 18 g, of which 6 g are felt; of 60 rad/s, 25 are felt."""
     model = random_model(spec=rig_spec(True))
     export_c(model, tmp_path / "hair.h")
     who, t = character(), np.arange(90) / 30
@@ -105,14 +105,14 @@ def test_the_header_passes_on_no_more_of_a_teleport_and_of_a_spin_than_the_bake(
     felt, asked = (values.reshape(len(t), -1, 2, 3) for values in (ours, wanted))
     assert np.abs(asked).max(axis=(0, 1, 3)) == pytest.approx([6, 25], rel=1e-4)
     np.testing.assert_allclose(felt[:, :, 1], asked[:, :, 1], atol=0.01)
-    # The header's accelerations lie between its frames: half of each is in the step before.
+    # The header's accelerations are between its frames: half of each is in the previous step.
     np.testing.assert_allclose(felt[:, 0, 0], (asked[:, 0, 0] + asked[:, 1, 0]) / 2, atol=0.01)
 
 
 @pytest.mark.parametrize("rate", [30, 60, 120, 240, 500])
 def test_a_sudden_start_and_turn_are_felt_alike_at_any_rate(tmp_path, rate):
-    """A controller sets somebody off at 2 m/s, and turns the head by 45 degrees, within one frame, however short that is; of
-    20 g and 50 rad/s that last for a tenth of a second as little is passed on as by a bake.
+    """A controller starts a character at 2 m/s, and turns the head by 45 degrees, within one frame, however short; of 20 g and 50
+    rad/s for a tenth of a second, as little is passed on as by a bake.
     """
     model = random_model(spec=rig_spec(True))
     export_c(model, tmp_path / "hair.h")
@@ -131,7 +131,7 @@ def test_a_sudden_start_and_turn_are_felt_alike_at_any_rate(tmp_path, rate):
         quaternions = to_quaternion(joints[:, who.head, :3, :3])
         rows = np.concatenate([t[:, None], joints[:, who.head, :3, 3], quaternions], axis=1)
         ours = run_c(program, rows, len(wanted))[round(1.2 * rate)]
-        # Blow by blow the two may lie in neighbouring steps; all in all they are the same.
+        # Each blow may be in a neighbouring step; their sums are the same.
         felt, asked = ((steps * values.reshape(-1, 2, 3)).sum(axis=0) for values in (ours, wanted))
         assert np.abs(felt - asked).max() < 0.15 * np.abs(asked).max(), (felt, asked)
 
@@ -170,7 +170,7 @@ int main(void) {
 
 
 def test_a_clock_in_double_is_still_exact_after_hours(tmp_path):
-    """Somebody runs at 5 m/s: nothing is felt. A clock in float is too coarse; the example shows none."""
+    """A character runs at 5 m/s: nothing is felt. A clock in float would be too coarse; the example does not use one."""
     export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
     felt = []
     for clock in ("time", "(double)(float)time"):
@@ -200,7 +200,7 @@ int main(void) {
 
 
 def test_gravity_may_point_anywhere(tmp_path):
-    """Who walks on a wall, a ceiling or round a planet feels there what is felt on the ground."""
+    """Walking on a wall, a ceiling or around a planet feels like walking on the ground."""
     export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
     program = compiled(tmp_path, WALL_HARNESS)
     t = np.arange(0, 3, 1 / 60)

@@ -9,7 +9,7 @@ from tests.core.rig.builders import character, skin, tail
 
 
 def test_rows_of_joints_that_no_name_tells_are_left_out():
-    """Not those of a face or below one, nor short ones, nor what hangs from a chain; of a holder, those that hang from it."""
+    """Not those of a face or below one, nor short ones, nor those below a chain; for a holder, those below it."""
     rows = [*tail("hair", 2), *tail("cable", 3, parent="hair_2"), ("all", "head", (0, 1.6, 0))]
     rows += [*tail("cord", 3, parent="all"), *tail("rope", 4, parent="all"), *tail("stub", 2), *tail("tongue", 3)]
     rows += [("jaw", "head", (0, 1.5, 0.1)), *tail("whip", 3, parent="jaw"), *tail("bare", 3)]

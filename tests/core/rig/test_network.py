@@ -30,7 +30,7 @@ def test_onnx_agrees_with_numpy(kind):
 @pytest.mark.parametrize("kind", ["static", "dynamic", "shipped"])
 @pytest.mark.parametrize("damage", [np.nan, np.inf, -np.inf])
 def test_a_damaged_avatar_stays_bounded_and_alone(kind, damage):
-    """NaN counts as the least that is read, as in the C header; no other row of the batch changes by a bit."""
+    """NaN counts as the smallest value read, as in the C header; no other row of the batch changes by a bit."""
     ort = pytest.importorskip("onnxruntime")
     pytest.importorskip("onnx")
     model = model_of(kind)
@@ -40,7 +40,7 @@ def test_a_damaged_avatar_stays_bounded_and_alone(kind, damage):
     stands_for = features.copy()
     stands_for[2, 3] = stands_for[5] = 1e9 if damage > 0 else -1e9
     graphs = [rig_graph(model)]
-    if kind == "shipped":  # what `export` hands out is what the file holds
+    if kind == "shipped":  # `export` writes what the file holds
         graphs.append(model_file.read(model_file.shipped("rig")).graphs["rig.onnx"])
     sessions = [ort.InferenceSession(graph, providers=["CPUExecutionProvider"]) for graph in graphs]
     runs = [model.evaluate, *(lambda f, s=s: s.run(None, {"features": f})[0] for s in sessions)]
@@ -60,7 +60,7 @@ def test_batch_and_single_agree():
 
 @pytest.mark.parametrize("kind", ["static", "dynamic"])
 def test_what_is_sent_beyond_the_limits_is_cut_off(kind):
-    """A damaged caller turns no joint farther than the largest motion that is read."""
+    """Wrong input turns no joint farther than the largest motion that is read."""
     model = model_of(kind)
     far = 1e4 * random_features(model, 50)
     np.testing.assert_array_equal(model.evaluate(far), model.evaluate(np.clip(far, -model.limits, model.limits)))
@@ -68,7 +68,7 @@ def test_what_is_sent_beyond_the_limits_is_cut_off(kind):
 
 
 def test_a_report_that_ran_away_is_not_written(tmp_path):
-    """What helps is an option of `rig train`: it has no --set."""
+    """The remedy is an option of `rig train`, which has no --set."""
     pytest.importorskip("onnx")
     bad = replace(random_model(), report={"loss": np.inf})
     with pytest.raises(NeuralocksError, match="m.neuralocks: .* NaN .*; give --bend, --weight and --damping nearer"):
@@ -77,7 +77,7 @@ def test_a_report_that_ran_away_is_not_written(tmp_path):
 
 
 def test_model_file_round_trip(tmp_path):
-    """Bit for bit, and damage is told in one line."""
+    """Bit for bit, and damage is reported in one line."""
     pytest.importorskip("onnx")
     model = random_model()
     path = model.save(tmp_path / "m.neuralocks")

@@ -98,7 +98,7 @@ def test_a_loose_tail_swings_as_a_pendulum():
 
 
 def test_turns_past_half_a_round_go_on_from_the_other_side():
-    """A loose tail that lies where it was while the head whirls about: quaternions of one sign, as networks give them."""
+    """A loose tail stays where it was while the head spins: quaternions keep one sign, as networks give them."""
     who = character([("hair_1", "head", (0, 1.6, 0)), ("hair_2", "hair_1", (0, 1.6, -0.3))])
     chains = find_chains(who)
     material = RigMaterial(bend=1e-9, damping=0.0, weight=0.0)
@@ -125,7 +125,7 @@ def test_spring_bones_rest_and_depend_on_the_frame_rate():
 
 
 def test_a_spring_bone_goes_on_as_its_specification_says():
-    """A bone that stands out backward and is pulled down: both frames by hand."""
+    """A bone that sticks out backwards and is pulled down: both frames computed by hand."""
     who = character([("hair_1", "head", (0, 1.6, 0)), ("hair_2", "hair_1", (0, 1.6, -0.3))])
     step, drag, stiffness, gravity = 0.1, 0.4, 1.0, 0.5
     pull = np.array([0, 0, -1.0]) * stiffness * step + np.array([0, -1.0, 0]) * gravity * step
@@ -152,7 +152,7 @@ def with_balls() -> tuple[HairRig, float]:
 
 
 def test_depths_in_the_body_are_those_of_balls():
-    """Wherever a point lies: a nearest plane or a part of the surface alone may take outside for inside."""
+    """Wherever a point is: a nearest plane, or only a part of the surface, may take outside for inside."""
     rig, radius = with_balls()
     pool = PosePool(rig, 4, np.random.default_rng(0), whole=True)
     rng = np.random.default_rng(1)
@@ -168,7 +168,7 @@ def test_depths_in_the_body_are_those_of_balls():
 
 
 def test_margins_are_those_at_rest_at_most():
-    """What rests on the body as modelled, whatever shapes it may take, is not pushed away."""
+    """Hair that rests on the body as modelled is not pushed away, whatever shapes the body may take."""
     rig, radius = with_balls()
     centre = np.array([0, 0.07, 0.02])  # of the head's ball, from the head joint
     points = centre + np.array([[radius + d, 0, 0] for d in (-0.004, 0.003, 0.02)])
@@ -178,7 +178,7 @@ def test_margins_are_those_at_rest_at_most():
 
 
 def test_hair_over_the_faces_of_a_coarse_body_is_not_thrown_off():
-    """There the plane of the nearest vertex lies centimetres above the surface."""
+    """There the plane of the nearest vertex is centimetres above the surface."""
     rig, _ = with_balls()
     body, ball = rig.character.body, trimesh.creation.icosphere(1, 0.12)
     points = np.concatenate([ball.vertices + (0, 1.62, 0.02), ball.vertices + (0, 1.3, 0)])
@@ -237,7 +237,7 @@ def test_a_teleport_and_other_frame_rates():
 
 
 def test_progress_goes_on_through_the_report(monkeypatch):
-    """Of both trainings: never backwards, to the end of the bar, and what the report is at is told."""
+    """In both trainings: never backwards, to the end of the bar, and with messages on the report's progress."""
     monkeypatch.setattr(rig_dynamic, "motion_report", partial(motion_report, kinds=("nod",)))
     rig, _ = with_balls()
     for train, options in ((train_static, {}), (train_dynamic, {"clips": 2, "clip_seconds": 0.5})):

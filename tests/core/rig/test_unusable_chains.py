@@ -51,7 +51,7 @@ def test_a_model_for_other_chains_is_refused():
 
 
 def test_joints_called_alike_are_told_apart_by_what_they_hang_from():
-    """A jaw's tip is not a lock's; where nothing tells, none is taken."""
+    """A jaw's tip is not a lock's; if nothing distinguishes them, none is taken."""
     lock = [("hair", "head", (0, 1.6, -0.1)), ("tip", "hair", (0, 1.5, -0.1)), ("end", "tip", (0, 1.4, -0.1))]
     chains = find_chains(character(lock))
     names = ["neck/head", "neck/head/jaw", "neck/head/jaw/tip", "neck/head/hair", "neck/head/hair/tip"]
@@ -105,7 +105,7 @@ def test_names_that_only_begin_otherwise(names, there, called):
 
 
 def test_hair_that_hangs_from_the_neck_is_named_with_its_carrier():
-    """The remedy is what works."""
+    """The remedy named is one that works."""
     who = character(tail("ponytail", 3, parent="neck"))
     with pytest.raises(NeuralocksError, match="'ponytail_1' hangs from 'neck': name that with --head neck"):
         find_chains(who)
@@ -115,7 +115,7 @@ def test_hair_that_hangs_from_the_neck_is_named_with_its_carrier():
 
 
 def test_chains_that_no_name_tells_come_before_a_tail_elsewhere():
-    """A creature's tail is no hair: with `--head hips` it would be trained as such, and the head's chains be left out."""
+    """A creature's tail is not hair: with `--head hips`, it would be trained as hair, and the head's chains left out."""
     rows = [*tail("tail", 4, at=(0, 1, -0.1), parent="hips"), *tail("Bone", 4)]
     who = character(rows)
     body = skin(who, dict.fromkeys(["hips", *(name for name, *_ in rows)], np.eye(3) * 0.1 + [0, 1.6, -0.1]))

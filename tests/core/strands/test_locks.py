@@ -39,7 +39,7 @@ def test_lock_size_does_not_follow_the_strand_count():
 
 
 def test_a_trifle_leaves_locks_as_they_are():
-    """One strand less, or a rounding, also along the middle; of what is trimmed only the neighbourhood changes."""
+    """One strand less, or rounding, also along the middle, changes little; trimming only changes the neighbourhood."""
     roots = scalp(3000)
     roots[:200, 0] = 1e-9 * np.random.default_rng(1).normal(size=200)
     lock = lock_of_roots(roots)
@@ -51,7 +51,7 @@ def test_a_trifle_leaves_locks_as_they_are():
 
 
 def shared(one, other):
-    """Mean share of a strand's lock, in either, that is its lock in both."""
+    """Mean share of a strand's lock, in either groom, that is its lock in both."""
     one, other = one[:, None] == one, other[:, None] == other
     return ((one & other).sum(axis=1) / (one | other).sum(axis=1)).mean()
 

@@ -44,7 +44,7 @@ def test_root_frames_take_the_normal_up():
     np.testing.assert_allclose(frames @ frames.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (500, 3, 3)), atol=1e-9)
     np.testing.assert_allclose(np.linalg.det(frames), 1.0, atol=1e-9)
     np.testing.assert_allclose(np.einsum("sij,sj->si", frames, normal), np.tile([0, 1.0, 0], (500, 1)), atol=1e-9)
-    # Smallest: the angle is the one between the normal and +Y.
+    # The smallest rotation: its angle is that between the normal and +Y.
     np.testing.assert_allclose(Rotation.from_matrix(frames).magnitude(), np.arccos(normal[:, 1]), atol=1e-6)
 
 
@@ -56,7 +56,7 @@ def test_scalp_local_forgets_where_the_strand_grows():
     shape = np.cumsum(random.normal(size=(K, 3)) * 0.003 + [0, 0.01, 0], axis=0)
     shape -= shape[0]
     grown = np.einsum("sji,kj->ski", root_frames(normal), shape) + 0.09 * normal[:, None] + CENTRE + ORIGIN
-    # Uniform samples of the same polyline differ from it by the resampling alone.
+    # Uniform samples of the same polyline differ from it only by the resampling.
     local = scalp_local(strand_set(Groom("/hair", grown.reshape(-1, 3), np.full(50, K)), ORIGIN, CENTRE))
     np.testing.assert_allclose(local, np.broadcast_to(local[0], local.shape), atol=1e-5)
 

@@ -60,7 +60,7 @@ def _written(path, motion="modulated", output="direction", principal=True, stran
     ],
 )
 def test_the_network_answers_as_the_model_does(tmp_path, motion, principal, maps):
-    """Whatever its inputs are normalised by, and to what never varied there, too."""
+    """However its inputs are normalised, and also for inputs that never varied in training."""
     path = _written(tmp_path / "a.neuralocks", motion, principal=principal, strand_map=maps[0])
     net, strands, frames = _normalised(motion, 1, strand_map=maps[1])
     beginning = Beginning(path)
@@ -137,7 +137,7 @@ def test_a_model_of_another_kind_is_refused_before_anything_is_simulated(tmp_pat
 
 
 def test_damaged_and_hostile_models_are_refused(tmp_path):
-    """Graphs that are none, that lack a layer, whose numbers lie in another file or are of other sizes."""
+    """Files that are not graphs, lack a layer, or have their numbers in another file or of other sizes."""
     path = _written(tmp_path / "a.neuralocks")
     whole = model.read(path)
 
@@ -185,8 +185,8 @@ def test_a_static_network_stays_static(tmp_path):
 
 
 def test_what_was_trained_is_not_lost_to_a_wrong_word(tmp_path):
-    """A model that is none or does not fit is refused before an earlier training's folder is touched, and a resumed training
-    goes on with what it began with only."""
+    """A file that is not a model, or a model that does not fit, is refused before an earlier training's folder is touched, and a
+    resumed training only continues with what it began with."""
     scene = TrainingScene(person(), (straight_hair(),))
     work = tmp_path / "b.neuralocks.training"
     work.mkdir()

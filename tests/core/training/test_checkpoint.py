@@ -76,7 +76,7 @@ def test_values_of_another_kind_than_were_kept_are_one_line(tmp_path, wrong):
     assert checkpoint.load(path, {"net": net}, optimisers, like=like) == kept
     with np.load(path) as archive:
         arrays = dict(archive)
-    like |= {name: 0 for name in wrong if name not in like}  # what is not there at all
+    like |= {name: 0 for name in wrong if name not in like}  # entries that are not there at all
     changed = {name: wrong.get(name, value) for name, value in kept.items()}
     np.savez(path, **{**arrays, "meta": np.frombuffer(json.dumps(changed).encode(), np.uint8)})
     with pytest.raises(NeuralocksError, match=r"c.npz: this checkpoint does not fit \(damaged"):

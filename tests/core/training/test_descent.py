@@ -11,7 +11,7 @@ from neuralocks_core.training.descent import Schedule, descend  # noqa: E402
 
 
 def test_step_sizes():
-    """Linear warm-up, half way down at half of the budget, the floor at its end."""
+    """Linear warm-up, halfway down at half of the budget, the floor at its end."""
     schedule = Schedule(rate=0.1, floor=0.02, warm_up=10)
     assert schedule.rate_at(0, 0.0) == pytest.approx(0.01)
     assert schedule.rate_at(4, 0.0) == pytest.approx(0.05)
@@ -55,7 +55,7 @@ def test_a_steep_step_is_clipped():
 
 
 def test_time_ends_it():
-    """A budget in minutes is one of wall-clock time, at least one step."""
+    """A budget in minutes is wall-clock time; at least one step is made."""
     place = torch.nn.Parameter(torch.ones(1))
     *_, last = descend([torch.optim.Adam([place])], lambda done: {"x": place.sum() ** 2}, Schedule(minutes=1e-6))
     assert last.step >= 1 and last.done == 1.0

@@ -29,7 +29,7 @@ def farm_of(monkeypatch, folder, *processes):
 
 
 class _Process:
-    """Stands in for one of a farm's."""
+    """Stands in for a process of a farm."""
 
     pid = None
 
@@ -61,7 +61,7 @@ def test_one_that_cannot_start_leaves_nothing_behind(tmp_path, monkeypatch):
 
 
 class _Farm:
-    """Stands in for one whose process saves its last rollout and ends right after it has been counted."""
+    """Stands in for a farm whose process saves its last rollout and ends right after it has been counted."""
 
     alive = True
     there = 0
@@ -121,7 +121,7 @@ _OF = SimpleNamespace(grooms=(SimpleNamespace(rest=np.zeros((3, K, 3))),), spec=
     ),
 )
 def test_a_simulation_of_something_else_says_what_to_do(tmp_path, other):
-    """Arrays that are whole, but do not fit each other or what is trained: else training breaks off over them."""
+    """Arrays that are whole, but do not fit each other or what is trained: without a check, training would break off."""
     path = tmp_path / "000000.npz"
     farm.save(path, _rollout())
     assert np.array_equal(farm.load(path, _OF).planes, _rollout().planes)
@@ -133,7 +133,7 @@ def test_a_simulation_of_something_else_says_what_to_do(tmp_path, other):
 
 @pytest.mark.parametrize("most", [32766, 32767])
 def test_a_simulation_that_names_no_step_is_gone_on_from_where_nothing_is_cut_off(tmp_path, most):
-    """Those of a training that was begun before steps were kept: to delete each of hundreds would be the remedy."""
+    """From a training that began before steps were stored: otherwise the remedy would be to delete hundreds of files."""
     path, arrays = tmp_path / "000000.npz", vars(replace(_rollout(), moved=np.full((5, 3, K, 3), -most, np.int16)))
     np.savez(path, **{name: array for name, array in arrays.items() if name != "step"})
     if most < 32767:
@@ -144,7 +144,7 @@ def test_a_simulation_that_names_no_step_is_gone_on_from_where_nothing_is_cut_of
 
 
 class _Scene:
-    """Stands in for one that the solver refuses; it knows whether Ctrl-C was heard where it arrived."""
+    """Stands in for a scene that the solver refuses; it knows whether Ctrl-C was heard where it arrived."""
 
     def __init__(self):
         self.deaf = sys.platform != "win32" and signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
@@ -157,7 +157,7 @@ class _Scene:
 
 
 def test_a_process_that_fails_says_why_and_leaves_ctrl_c_to_the_trainer(tmp_path, capfd):
-    """A terminal sends it to all; a simulation that hears it ends in a traceback beside the trainer's `stopped`."""
+    """A terminal sends it to all; a simulation that hears it would end in a traceback beside the trainer's `stopped`."""
     before = signal.getsignal(signal.SIGINT)
     with farm.RolloutFarm(_Scene(), tmp_path, 1) as workers:
         assert signal.getsignal(signal.SIGINT) is before
@@ -171,7 +171,7 @@ def test_a_process_that_fails_says_why_and_leaves_ctrl_c_to_the_trainer(tmp_path
 
 
 def test_ctrl_c_while_processes_start_is_heard_once_they_run(tmp_path, monkeypatch):
-    """To make them takes seconds, in which a terminal's Ctrl-C was lost."""
+    """Starting them takes seconds, in which a terminal's Ctrl-C could be lost."""
     started = []
 
     class Process:

@@ -30,7 +30,7 @@ def test_a_smooth_head_becomes_coarse_and_hardly_moves():
 
 
 def test_hair_beside_an_ear_is_outside():
-    """Both sides of an ear lie in one cell; welded to a sheet, half of what hangs beside it counted as inside."""
+    """Both sides of an ear are in one cell; welded to a sheet, half of the hair beside it would count as inside."""
     head = trimesh.creation.icosphere(subdivisions=4, radius=0.1).apply_translation(CENTRE)
     ear = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
     ear.apply_scale([0.002, 0.03, 0.02]).apply_translation(EAR)

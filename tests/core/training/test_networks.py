@@ -47,7 +47,7 @@ def _frame(graph, frame):
 
 @torch.no_grad()
 def _weights_in_frame(net, part):
-    """Second and output layer's (in, out) weights where the frame's part (1, P) is this."""
+    """Second and output layer's (in, out) weights for this frame's part (1, P)."""
     middle, out = net.middle.weight.T.clone(), net.out.weight.T.clone()
     if net.motion != "modulated":
         return middle, out
@@ -99,7 +99,7 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, strand_map, out
     rest = (torch.randn(9, 24, 3) * 0.01 + torch.tensor([0.0, -0.01, 0.0])).cumsum(1)
     anchor = torch.randn(9, 24, 3)
     anchor[:, :2] = 0
-    # What smooths directions along a strand is part of the graphs' last layer.
+    # The smoothing of directions along a strand is part of the graphs' last layer.
     along = torch.from_numpy(smoothing()).float() if output == "direction" else torch.eye(24)
     read = torch.kron(along.T.contiguous(), torch.eye(3))
     inputs = {
@@ -111,7 +111,7 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, strand_map, out
     close = 1e-4 if motion == "linear" else 2e-3  # deep maps are stored in float16
     part = net.frame_part(frame).detach()
     np.testing.assert_allclose(inputs["frame_part"], part[:, :256], atol=close)
-    # Vertices 0 and 1 are clamped, the network's answer for them is not asked for.
+    # Vertices 0 and 1 are clamped; the network's answer for them is not used.
     middle, out = _weights_in_frame(net, part)
     out = out @ read
     out[:, :6] = 0
@@ -132,7 +132,7 @@ def test_onnx_graphs_take_si_inputs_and_agree_with_torch(motion, strand_map, out
 
 
 def test_hair_of_a_network_that_is_unsure_does_not_zigzag():
-    """Edges whose directions alternate would make hair shorter; of such an answer nothing but a slope at the tip is left."""
+    """Edges with alternating directions would make hair shorter; only a slope at the tip is left of such an answer."""
     rest = torch.linspace(0, 0.2, 24)[None, :, None] * torch.tensor([0.0, -1.0, 0.0])
     sign = (-1.0) ** torch.arange(24)
     offsets = sign[None, :, None] * torch.tensor([0.8, 0.0, 0.0])

@@ -36,7 +36,7 @@ def hanging_and_kinked():
 
 
 def test_bending_is_the_turn_from_edge_to_edge_that_is_missing():
-    """|e' - e| of two edges that a turn by an angle parts is twice the sine of its half, in edge lengths."""
+    """|e' - e| of two edges at an angle is twice the sine of half the angle, in edge lengths."""
     straight, bent = hanging_and_kinked()
     moved = torch.tensor(bent - straight, dtype=torch.float32).expand(1, 2, 1, K, 3)
     batch = {

@@ -25,7 +25,7 @@ SPEC = BoundarySpec(bins=(1,) * 8)
 
 
 def _ball(radius=0.08):
-    """An octahedron cut finer, as (points, triangles)."""
+    """A subdivided octahedron, as (points, triangles)."""
     import trimesh
 
     mesh = trimesh.creation.icosphere(3, radius)
@@ -94,7 +94,7 @@ def test_hair_carried_rigidly_by_an_accelerating_head_feels_that_acceleration(po
         second = origin - 2 * moment.back[0] @ origin + moment.back[1] @ origin
         felt = moment.gravity - second[:3] * 30**2
         vector = moment.vectors[2]
-        if np.linalg.norm(felt - moment.gravity) < 5 * 9.81:  # the boundary limits what is beyond
+        if np.linalg.norm(felt - moment.gravity) < 5 * 9.81:  # the boundary limits larger ones
             np.testing.assert_allclose(vector[gravity] + vector[history][:3], felt / 9.81, atol=2e-3)
 
 
@@ -139,7 +139,7 @@ def test_each_choice_changes_what_is_minimised(pool, inputs):
 
 
 def test_grooms_of_few_strands_are_learned_beside_others_each_moment_as_much(pool, inputs):
-    """Hair of 16 strands and of 5 does not stack."""
+    """Hair of 16 strands and of 5 cannot be stacked."""
     scene = replace(pool.scene, grooms=(straight_hair(), straight_hair(5, 1)))
     mixed = MomentPool(scene)
     for _ in range(4):
@@ -177,7 +177,7 @@ def test_a_past_that_is_not_detached_changes_the_gradient(pool, inputs):
 
 
 def test_hair_finds_less_energy_than_rigid_hair_has(pool, inputs):
-    """Heads that lean most: what is learned must hang lower at no more bending and collision than it gains."""
+    """On the heads that lean most, the learned hair must hang lower, and gain more than it loses by bending and collision."""
     net, options = _net(pool, inputs), SelfSupervisedOptions(static=True, random_materials=False, volume=0.0)
     leaning = sorted(pool.moments, key=lambda m: m.gravity[1])[-6:]
     hair, rng = [pool.hair[m.hair] for m in leaning], np.random.default_rng(0)

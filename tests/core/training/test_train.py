@@ -79,7 +79,7 @@ def test_held_out_strands_are_never_trained_on(scene):
 
 
 def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(scene, tmp_path, monkeypatch):
-    """By seconds, each step learned from what happened to be there."""
+    """With a budget in seconds, each step learns from what happens to be there."""
     monkeypatch.setattr(methods, "FIRST", 4)
     monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
     graphs = []
@@ -176,8 +176,8 @@ def test_a_training_that_runs_away_is_one_line(scene, tmp_path, monkeypatch):
 
 
 def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
-    """Weights of another output or method fit in shape: hair would be answered wrongly, or the optimiser would break.
-    Simulations tell of the strands and the motion that they were made of; two trainings in one folder would mix theirs.
+    """Weights of another output or method fit in shape: hair would be wrong, or the optimiser would break. Simulations belong to
+    the strands and the motion that they were made from; two trainings in one folder would mix theirs.
     """
     out, tiny = tmp_path / "hair.neuralocks", {"clips": 2, "strands": 2}
     train_strands(scene, out, RegressionOptions(steps=2, **tiny), rollouts=4, keep_work=True)

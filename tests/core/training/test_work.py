@@ -10,7 +10,7 @@ from neuralocks_core.training import work
 
 
 def _kept(out):
-    """What a training that was killed leaves."""
+    """What a killed training leaves."""
     folder = work.folder_beside(out)
     (folder / "rollouts").mkdir(parents=True)
     for name in ("lock", "inputs.json", "checkpoint.npz", "rollouts/000000.npz"):
@@ -19,7 +19,7 @@ def _kept(out):
 
 
 def test_what_nobody_resumes_is_removed_and_nothing_else(tmp_path):
-    """Not the model, not what another training is at work in, and not what somebody has put there."""
+    """Not the model, not the folder of another running training, and not what somebody has put there."""
     out = tmp_path / "hair.neuralocks"
     out.touch()
     work.abandon(out)
@@ -36,7 +36,7 @@ def test_what_nobody_resumes_is_removed_and_nothing_else(tmp_path):
 
 
 def test_a_name_is_reserved_once(tmp_path):
-    """Until who has it gives it up; not where there is a model, or a training that somebody may resume."""
+    """Until its holder releases it; not if there is a model, or a training that somebody may resume."""
     out, kept = tmp_path / "hair.neuralocks", tmp_path / "kept.neuralocks"
     assert work.reserve(out) and not work.reserve(out)
     work.abandon(out)
@@ -62,7 +62,7 @@ def test_notes_that_are_none_are_one_line(tmp_path, monkeypatch, forged):
 
 @pytest.mark.parametrize("learned_with", (work.CODES, work.BEGINNING))
 def test_a_network_does_not_go_on_without_what_it_learned_with(tmp_path, learned_with):
-    """New codes of the strands would mean something else to it, and the model would be wrong without a word."""
+    """New codes of the strands would mean something else to it, and the model would be silently wrong."""
     out = tmp_path / "hair.neuralocks"
     folder = _kept(out)
     with pytest.raises(NeuralocksError, match="lacks codes.npz, with which .*; train without --resume"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What goes on with the strands of curves that are imported from USD."""
+"""What is kept with the strands of curves that are imported from USD."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from ..shots import Recipe, write_shot
 
 @pytest.fixture
 def imported(tmp_path):
-    """Imports a shot in which a function changed the stage; the curves' prim, its stage and the notes."""
+    """Imports a shot whose stage a function has changed; returns the curves' prim, its stage and the notes."""
 
     def make(change):
         source = write_shot(tmp_path, Recipe(bound="own", strands=3, vertices=4, unit=0.01, up="Z"))
@@ -38,7 +38,7 @@ def test_purpose_and_visibility_go_on_also_those_of_the_prims_above(imported):
 
 @pytest.mark.parametrize("switched", [False, True])
 def test_what_is_shown_at_some_time_is_shown(imported, switched):
-    """And what says nothing of purpose and visibility goes on saying nothing."""
+    """And curves without purpose and visibility stay without them."""
 
     def change(stage):
         if switched:
@@ -53,7 +53,7 @@ def test_what_is_shown_at_some_time_is_shown(imported, switched):
 
 
 def test_constant_primvars_of_the_prims_above_go_on(imported):
-    """As renderers read them: the nearest counts, and only constant ones come down."""
+    """As renderers read them: the nearest counts, and only constant ones are inherited."""
     names = Sdf.ValueTypeNames
 
     def change(stage):
@@ -77,7 +77,7 @@ def test_constant_primvars_of_the_prims_above_go_on(imported):
 
 
 def test_what_does_not_go_on_is_told(imported):
-    """Positions of another unit and axis, files that are named, and what shades the hair."""
+    """Positions in another unit and axis, file names, and what shades the hair."""
     names = Sdf.ValueTypeNames
 
     def change(stage):

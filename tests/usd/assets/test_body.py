@@ -29,7 +29,7 @@ def findings(path):
 @pytest.mark.parametrize("name", ["body.usdc", "motion.usdc", "groom.usdc", "shot.usda"])
 def test_the_shipped_layers_have_no_finding(name):
     found = findings(SHOT / name)
-    if name in ("motion.usdc", "groom.usdc"):  # alone they lack what the body layer defines
+    if name in ("motion.usdc", "groom.usdc"):  # alone, they lack what the body layer defines
         found = [e for e in found if "defaultPrim" in e.GetMessage() and "invalid" in e.GetMessage()]
     assert not found, [f"{e.GetName()}: {e.GetMessage()}" for e in found]
 
@@ -45,7 +45,7 @@ def test_the_shipped_body_is_a_person():
     assert wanted <= set(character.humanoid)
     leaves = [name.rsplit("/", 1)[-1] for name in character.skeleton.names]
     assert len(set(leaves)) == len(leaves) and all(leaf.replace("_", "").isalnum() for leaf in leaves)
-    # Blend shapes leave the head on its joint: no vertex of it goes farther than heads differ in size.
+    # Blend shapes leave the head on its joint: none of its vertices moves farther than heads differ in size.
     head = character.head_skin
     assert all(np.abs(offsets[head]).max() < 0.04 for offsets in body.shapes.values())
 
@@ -84,7 +84,7 @@ def test_a_body_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     assert np.allclose(again.skeleton.bind, bind) and np.allclose(again.body.points, points, atol=1e-6)
     with pytest.raises(NeuralocksError, match="end its name"):
         write_body(tmp_path / "body.fbx", body)
-    monkeypatch.setattr("usd.assets.body.statistical_body", None)  # which takes a minute
+    monkeypatch.setattr("usd.assets.body.statistical_body", None)  # because it takes a minute
     with pytest.raises(NeuralocksError, match="not a folder, on the way"):
         write_body(path / "body.usda")
 

@@ -43,14 +43,14 @@ def test_a_training_may_learn_from_variations_of_each_style(tmp_path, monkeypatc
     assert told == [(done, 6, f"growing {style}") for done, style in enumerate(["bob", "coils"] * 3)]
     for groom, same in zip(few, many[:2], strict=True):
         np.testing.assert_array_equal(groom.rest, same.rest)
-    # What `grow --variation` gives is what is learned from.
+    # Training learns from what `grow --variation` gives.
     path = grow("coils", BODY, tmp_path / "coils.usda", count=40, seed=1, variation=2)
     (own,) = training_scene(BODY, [str(path)]).grooms
     np.testing.assert_allclose(own.rest, many[5].rest, atol=1e-6)
 
 
 def test_variations_are_of_a_style_of_the_library(tmp_path):
-    """Of a groom of one's own there are none, and a number below 0 is no variation."""
+    """The user's own grooms have none, and a number below 0 is not a variation."""
     with pytest.raises(NeuralocksError, match="--variations 2.*--groom library"):
         training_scene(BODY, [], variations=2)
     for count in (-1, 51):
@@ -62,7 +62,7 @@ def test_variations_are_of_a_style_of_the_library(tmp_path):
 
 @pytest.mark.parametrize("unit, up", [(0.01, "Z"), (0.0254, "Y")])
 def test_a_groom_suits_the_stage_of_its_character(tmp_path, unit, up):
-    """Laid over a character in another unit or axis, it sits on the head without a transform of the user's."""
+    """Over a character in another unit or axis, it sits on the head without a transform by the user."""
     shot = write_shot(tmp_path, Recipe(unit=unit, up=up))
     groom = grow("bob", shot, tmp_path / "groom.usda", count=40)
     layer = Sdf.Layer.CreateNew(str(tmp_path / "both.usda"))
@@ -80,7 +80,7 @@ def test_a_groom_suits_the_stage_of_its_character(tmp_path, unit, up):
 
 
 def test_what_is_read_is_not_written_over(tmp_path):
-    """`grow` put a groom in place of the character, and `import` one in place of the shot, by any name of theirs."""
+    """`grow` must not replace the character with a groom, nor `import` the shot, under any of their names."""
     folder = tmp_path / "shot"
     shutil.copytree(BODY.parent, folder)
     (tmp_path / "link").symlink_to(folder)
@@ -98,7 +98,7 @@ def test_what_is_read_is_not_written_over(tmp_path):
     ("name", "words"), [("x.txt", "end its name with .usd"), ("file/x.usda", "not a folder, on the way")]
 )
 def test_where_nothing_can_be_written_is_told_before_it_grows(tmp_path, monkeypatch, name, words):
-    """A full head takes a minute."""
+    """Growing a full head takes a minute."""
     (tmp_path / "file").touch()
     monkeypatch.setattr(Barber, "grow", None)
     with pytest.raises(NeuralocksError, match=words):

@@ -91,7 +91,7 @@ def test_hair_that_the_network_leaves_still_follows_the_skin_as_usd_skel_does(tm
         expected = rest @ matrix[:3, :3].T + matrix[:3, 3]
         frames = bake(shot, tmp_path / "one.usdc", still_model, frames=[code]) if code % 1 else result
         assert np.abs(world_points(frames.path, code) - expected).max() < 2e-6
-    # In the bind pose the author's own bits come back.
+    # In the bind pose, the author's exact bits come back.
     assert np.array_equal(samples(result.path, "points", at=1.0), samples(shot, "points"))
 
 
@@ -111,7 +111,7 @@ def test_units_axes_and_nesting_do_not_matter(baked, tmp_path, model, recipe):
     result = bake(write_shot(tmp_path, recipe), tmp_path / "bake.usdc", model)
     for code in (1.0, 6.0):
         here = world_points(result.path, code, f"{recipe.nesting}/Hair")
-        # Without skin the head's centre is an average one, which the network's inputs feel.
+        # Without skin, the head's centre is an average one, which changes the network's inputs.
         tolerance = 2e-2 if recipe.bound == "none" else 5e-5
         assert np.abs(here - world_points(baked[1].path, code)).max() < tolerance
 
@@ -170,7 +170,7 @@ def test_sliders_that_a_model_never_heard_of_are_said(tmp_path, still_model):
 
 
 def test_frames_without_animation_are_said(tmp_path, still_model):
-    """A shot at 1001 whose animation stayed at 1: nothing is wrong with any file, and nothing moves."""
+    """A shot at 1001 whose animation stayed at 1: no file has an error, and nothing moves."""
     shot = write_shot(tmp_path)
     for frames, told in (("5:12", False), ("9", False), ("8:20", True)):
         notes = bake(shot, tmp_path / "a.usdc", still_model, frames=frames).notes
@@ -213,7 +213,7 @@ def test_a_groom_inside_an_instance_is_baked(tmp_path, model):
 
 
 def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path, still_model):
-    """USD looks for names without ./ in the folder of the stage's first layer, too."""
+    """USD also looks for names without ./ in the folder of the stage's first layer."""
     for name in ("show", "layout", "cache"):
         (tmp_path / name).mkdir()
     write_shot(tmp_path / "show", name="hero")

@@ -12,7 +12,7 @@ from usd.shot.stage import read_shot
 from ..shots import Recipe, samples, write_shot
 
 LENGTHS = 0.2, 1.0, 1.5
-"""How long the hair of each prim is, of the recipe's: they reach different parts of the body."""
+"""Hair length of each prim, relative to the recipe's: they reach different parts of the body."""
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ CUT, LAST = 13, 24
 
 @pytest.fixture(scope="module")
 def shots(tmp_path_factory):
-    """A shot whose character is put 3 m aside at frame 13, and the same from there on."""
+    """A shot whose character jumps 3 m aside at frame 13, and the same shot from that frame on."""
     folder = tmp_path_factory.mktemp("cuts")
     path = write_shot(folder, Recipe(frames=LAST, strands=8))
     stage = Usd.Stage.Open(str(path))
@@ -61,7 +61,7 @@ def test_hair_starts_anew_after_a_cut(bakes):
 
 
 def test_cuts_that_follow_each_other_at_once_are_told_with_what_makes_them_some(tmp_path, shots, model):
-    """Three frames of a flash: the hair would be flung twice, and nothing would say so."""
+    """A flash of three frames would fling the hair twice, without a message."""
     layer = Sdf.Layer.CreateNew(str(tmp_path / "flash.usda"))
     layer.TransferContent(Sdf.Layer.FindOrOpen(str(shots[0])))
     stage = Usd.Stage.Open(layer)
@@ -80,7 +80,7 @@ def test_cuts_that_follow_each_other_at_once_are_told_with_what_makes_them_some(
 
 
 def test_velocities_do_not_span_a_cut(bakes):
-    """Else motion blur would draw the hair over the whole way."""
+    """Otherwise motion blur would smear the hair along the whole jump."""
     for code in (CUT - 2, CUT - 1, CUT, CUT + 1):
         found, none = (samples(bakes[name].path, "velocities", at=code) for name in ("found", "none"))
         assert np.abs(found).max() < 5 and np.abs(none).max() > 5
@@ -99,7 +99,7 @@ def test_a_bake_tells_the_cuts_that_were_given(bakes):
 
 @pytest.mark.parametrize("way", ["reference", "sublayer"])
 def test_cuts_of_a_bake_are_moved_with_its_samples(bakes, tmp_path, way):
-    """By the offsets and rates of the layers and references above it."""
+    """By the offsets and scales of the layers and references above it."""
     path, above = bakes["given"].path, tmp_path / "above.usda"
     layer = Sdf.Layer.CreateNew(str(above))
     layer.timeCodesPerSecond = 48

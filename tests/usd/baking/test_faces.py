@@ -39,7 +39,7 @@ def face(folder, weights, way=None, unit=0.01):
 
 @pytest.mark.parametrize("resolve", [False, True])
 def test_hair_rides_on_a_face_that_moves(tmp_path, still_model, resolve):
-    """By as much as its skin, in the head's axes, between keys in part; nothing moves where no shape does."""
+    """It moves as much as its skin, in the head's axes, and in part between keys; nothing moves where no shape does."""
     way = np.array([0.002, -0.012, 0.005])
     moving = bake(face(tmp_path, {1: 0.0, LAST: 1.0}, way), tmp_path / "moving.usdc", still_model, resolve=resolve)
     (tmp_path / "still").mkdir()
@@ -50,7 +50,7 @@ def test_hair_rides_on_a_face_that_moves(tmp_path, still_model, resolve):
         with_it, without = (world_points(out.path, code) for out in (moving, still))
         axes, _, _, _ = np.linalg.lstsq(rest - rest[0], without - without[0], rcond=None)
         expected = (code - 1) / (LAST - 1) * (way[[0, 2, 1]] * [1, 1, -1]) @ axes
-        near = 5e-4 if resolve else 2e-6  # skin that moves is measured more roughly than skin that stands still
+        near = 5e-4 if resolve else 2e-6  # moving skin is measured more roughly than still skin
         np.testing.assert_allclose(with_it - without, np.broadcast_to(expected, rest.shape), atol=near)
     np.testing.assert_array_equal(samples(moving.path, "points", at=1), samples(still.path, "points", at=1))
 
@@ -59,13 +59,13 @@ def test_hair_lies_on_a_head_larger_than_it_was_groomed_on(tmp_path, still_model
     out = bake(face(tmp_path, {1: 1.0}), tmp_path / "out.usdc", still_model, resolve=False).path
     roots = world_points(out, 1).reshape(12, 12, 3)[:, 0]
     was = strand_points(12, 12)[:, 0] - CENTRE
-    np.testing.assert_allclose(roots - CENTRE, 1.5 * was, atol=2e-3)  # of a ball of flat faces
+    np.testing.assert_allclose(roots - CENTRE, 1.5 * was, atol=2e-3)  # on a ball with flat faces
     card = evaluate(out).grooms["/Hero/Hair"]
     assert card["penetration_percent"] < 1 and card["speed_cm_s"] == pytest.approx(0, abs=0.01)
 
 
 def test_hair_is_pushed_out_of_a_head_larger_than_it_was_groomed_on(tmp_path):
-    """From where it lies on that head: by its own points it would rest deep inside, and be left there."""
+    """Starting from its place on that head: by its own points it would rest deep inside, and be left there."""
     shot, lively, depths = face(tmp_path, {1: 1.0}), write_random_model(tmp_path / "lively.neuralocks", 25), []
     for resolve in (False, True):
         out = bake(shot, tmp_path / f"{resolve}.usdc", lively, resolve=resolve).path
@@ -74,7 +74,7 @@ def test_hair_is_pushed_out_of_a_head_larger_than_it_was_groomed_on(tmp_path):
 
 
 def test_the_solver_and_the_report_card_see_the_same_skin(tmp_path):
-    """A face that goes down and up again carries the solver's hair along, and is no motion of that hair."""
+    """A face that goes down and up again carries the solver's hair along, which does not count as motion of the hair."""
     pytest.importorskip("warp")
     way, cards = np.array([0.0, 0.0, -0.02]), []
     for name, weights in (("moving", {1: 0.0, 5: 1.0, LAST: 0.0}), ("still", {1: 0.0})):

@@ -44,7 +44,7 @@ def test_joined_parts_are_the_one_bake_byte_for_byte(shot, tmp_path, model, endi
 
 @pytest.mark.parametrize("subframes", [1, 3])
 def test_parts_of_a_stage_that_counts_seconds(shot, tmp_path, model, subframes):
-    """Their frames are no whole numbers; what lies beyond a part is told by the same ones as within it."""
+    """Frames are not whole numbers there; a part's outer frames have the same numbers as in the other parts."""
     stage = Usd.Stage.CreateNew(str(tmp_path / "seconds.usda"))
     stage.SetTimeCodesPerSecond(1)
     stage.SetFramesPerSecond(24)
@@ -63,7 +63,7 @@ def test_parts_of_a_stage_that_counts_seconds(shot, tmp_path, model, subframes):
 
 
 def test_usds_own_stitching_gives_the_same_values(shot, tmp_path, model):
-    """What `usdstitch` does; layers over each other would hide the weaker's samples."""
+    """This is what `usdstitch` does; in a stack of layers, the weaker one's samples would be hidden."""
     parts = parts_of(shot, tmp_path, model)
     stitched = Sdf.Layer.CreateAnonymous(".usda")
     for part in parts:

@@ -40,14 +40,14 @@ def _learned(shot, **changes) -> dict:
 
 def test_a_model_of_another_body_is_told(model, shot):
     assert _notes(model, shot, _learned(shot)) == []
-    # A head 30 mm narrower than all that was learned, and one a millimetre narrower.
+    # A head 30 mm narrower than all that were learned, and one a millimetre narrower.
     half = body_measures(shot.rigs[0].character)[0]
     (note,) = _notes(model, shot, _learned(shot, lowest={0: half + 0.03}, highest={0: half + 0.04}))
     assert note.startswith(
         "/Hero/Rig: the model was trained on another body: head half width 0.1 m (trained: 0.13 to 0.14)"
     )
     assert _notes(model, shot, _learned(shot, lowest={0: half + 0.001}, highest={0: half + 0.04})) == []
-    # Joints of shoulders differ by centimetres from rig to rig of one body.
+    # Shoulder joints differ by centimetres between rigs of one body.
     arms = body_measures(shot.rigs[0].character)[6]
     assert _notes(model, shot, _learned(shot, highest={6: arms - 0.02})) == []
     (note,) = _notes(model, shot, _learned(shot, highest={6: arms - 0.05}))

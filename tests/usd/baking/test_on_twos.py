@@ -17,7 +17,7 @@ NOTE = "its animation holds poses for 2 frames each; hair moves as if the motion
 
 
 def on_twos(path, back=0.0):
-    """Each second frame gets the pose of the one before; with `back`, by a key so long [frames] before the next pose."""
+    """Every second frame gets the previous one's pose; with `back`, by a key this many frames before the next pose."""
     stage = Usd.Stage.Open(str(path))
     motion = next(UsdSkel.Animation(prim) for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation))
     for attribute in (motion.GetTranslationsAttr(), motion.GetRotationsAttr(), motion.GetScalesAttr()):

@@ -45,7 +45,7 @@ def _header(shot, out):
 
 @pytest.fixture
 def shot(tmp_path):
-    """A shot that says at its top what its references need."""
+    """A shot whose root layer states what its references need."""
     folder = tmp_path / "show" / "shots"
     folder.mkdir(parents=True)
     (folder / "hero.usda").write_text('#usda 1.0\n(defaultPrim = "Hero")\ndef Xform "Hero" {\n  def "Hair" {\n}\n}\n')
@@ -81,7 +81,7 @@ def test_every_process_writes_the_same_bytes(shot, tmp_path):
 
 
 def test_a_shot_behind_a_link_is_named_as_it_was_given(shot, tmp_path):
-    # A store of files by content: names without meaning and ending, and nothing beside them.
+    # A store of files by content: names without meaning or extension, and nothing beside them.
     (tmp_path / "store").mkdir()
     os.rename(shot, tmp_path / "store" / "5f3a")
     shot.symlink_to(tmp_path / "store" / "5f3a")
@@ -122,7 +122,7 @@ def test_the_extent_holds_hair_that_grows_wider_over_the_shot(tmp_path, still_mo
 
 @pytest.mark.parametrize("unit", [1.0, 0.01])
 def test_the_extent_holds_the_width_of_hair_in_the_unit_of_its_points(tmp_path, still_model, unit):
-    """Under a scale of its own, too."""
+    """Also if the hair has its own scale."""
     path = write_shot(tmp_path, Recipe(unit=unit, bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
@@ -137,7 +137,7 @@ def test_the_extent_holds_the_width_of_hair_in_the_unit_of_its_points(tmp_path, 
 
 @pytest.mark.parametrize("bound", ["mesh", "none"])
 def test_a_moving_cache_gets_its_shape_at_rest_in_its_own_space(tmp_path, still_model, bound):
-    """In centimetres, Z up, of a character that stands turned and elsewhere: what takes the points there does not commute."""
+    """In centimetres, Z up, for a turned and moved character: the transforms of the points do not commute."""
     place = np.eye(4)
     place[:3, :3], place[:3, 3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], [2, 0.5, -1]
     path = write_shot(tmp_path, Recipe(unit=0.01, up="Z", place=place, bound=bound, frames=9))

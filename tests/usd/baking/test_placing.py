@@ -27,7 +27,7 @@ def test_parts_give_what_the_whole_gives(tmp_path, monkeypatch, wrap):
     assert (item.beyond is None) == (wrap == "pinned")
     character = item.attachment.character
     whole = strands_on(character, item.groom)
-    # As hair moves: each strand its own way, more towards the tip.
+    # As hair moves: each strand in its own way, more towards the tip.
     along = np.linspace(0, 1, whole.rest.shape[1], dtype=np.float32)[:, None]
     moved = np.random.default_rng(0).normal(0, 0.02, (len(whole.rest), 1, 3)).astype(np.float32) * along
     joints = item.attachment.rig.joints_at(5.0)
@@ -61,7 +61,7 @@ def test_a_head_that_moves_by_a_tenth_of_a_millimetre_takes_its_hair_along(tmp_p
 
 @pytest.mark.parametrize("unit", [1.0, 0.0007])
 def test_hair_that_stands_where_it_rests_has_its_own_points(tmp_path, unit):
-    """Up to a thousandth of a millimetre, however many units that is: a pose in single precision is no nearer."""
+    """Up to a thousandth of a millimetre, however many units that is: single precision is not more exact."""
     item = read_shot(write_shot(tmp_path, Recipe(unit=unit))).grooms[0]
     joints = item.attachment.rig.joints_at(1.0)
     assert unit == 1 or np.abs(item.attachment.character.carrying(joints) - np.eye(4)).max() > 1e-9

@@ -70,7 +70,7 @@ def test_a_killed_bake_leaves_nothing_and_goes_on(tmp_path, model):
 
 @pytest.mark.parametrize("beards", [0, 1])
 def test_a_bake_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path, model, monkeypatch, beards):
-    """Also twice, and where grooms are posed together; a frame stays no longer than something needs it."""
+    """Also if stopped twice, and if grooms are posed together; a frame stays only as long as something needs it."""
     shot, out = write_shot(tmp_path, Recipe(frames=14, strands=60)), tmp_path / "bake.usdc"
     layer = Sdf.Layer.FindOrOpen(str(shot))
     for number in range(beards):
@@ -107,7 +107,7 @@ def test_a_bake_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path, model, monk
 
 
 def test_a_layer_that_no_log_can_be_kept_of_is_written_all_the_same(tmp_path, model, monkeypatch):
-    """As one of a later USD could be: a bake that is stopped then goes on from its frames, all of which stay."""
+    """As could be with a later USD: a stopped bake then resumes from its frames, all of which stay."""
     shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
     monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
     whole = bake(shot, out, model).path.read_bytes()
@@ -128,7 +128,7 @@ def test_a_layer_that_no_log_can_be_kept_of_is_written_all_the_same(tmp_path, mo
 
 @pytest.mark.parametrize("frames", ["1:9", "1:5"])
 def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatch, frames):
-    """Also for as many; what was saved of it is gone then."""
+    """Also for the same number of frames; then what was saved of it is gone."""
     shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
     monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
     whole = bake(shot, out, model, frames="2:6").path.read_bytes()
@@ -148,7 +148,7 @@ def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatc
 
 @pytest.mark.parametrize("changed", [{"folder": "a/deeper"}, {"cuts": []}, {"joints": {"head": "head"}}])
 def test_a_stopped_bake_goes_on_to_a_file_that_tells_how_it_was_made_now(tmp_path, model, monkeypatch, changed):
-    """Where the folder was moved, or options are told that change no sample: a layer that finds no shot is worth nothing."""
+    """If the folder was moved, or recorded options that change no sample differ: a layer that does not find its shot is worthless."""
     shot, first = write_shot(tmp_path), tmp_path / "one" / "bake.usdc"
     last = tmp_path / changed.pop("folder", "one") / first.name
     monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
@@ -229,7 +229,7 @@ def test_frames_of_another_version_of_the_program_are_not_taken_over(tmp_path, m
 
 
 def test_frames_of_a_shot_read_otherwise_are_not_taken_over(tmp_path, model):
-    """Neither by a bake nor by a simulation, and whoever read it: hair would swing about another joint from there on."""
+    """Neither by a bake nor by a simulation, whoever read the shot: from there on, hair would swing about another joint."""
     path, out = write_shot(tmp_path, Recipe(bound="none")), tmp_path / "bake.usdc"
     makers = [lambda shot, **options: bake(shot, out, model, **options)]
     if importlib.util.find_spec("warp"):
@@ -248,7 +248,7 @@ def test_frames_of_a_shot_read_otherwise_are_not_taken_over(tmp_path, model):
 
 
 def test_a_bake_that_goes_on_asks_for_the_space_that_it_still_needs(tmp_path, model, monkeypatch):
-    """Without what was left beside the finished frames, which is gone by then; where it is refused, these stay."""
+    """Not counting left-over files beside the finished frames, which are gone by then; if it is refused, the frames stay."""
     shot, out = write_shot(tmp_path, Recipe(frames=10, strands=50, vertices=10)), tmp_path / "bake.usdc"
     layer = Sdf.Layer.FindOrOpen(str(shot))
     Sdf.CopySpec(layer, "/Hero/Hair", layer, "/Hero/Beard")

@@ -39,7 +39,7 @@ def written(folder, log=None, puts=0, until=12, name="layer.usdc"):
 
 @pytest.mark.parametrize(("lost", "puts"), [(0, 8), (40, 8), (2000, 6), (80_000, 4), (270_000, 0)])
 def test_a_save_that_was_cut_off_is_taken_back(tmp_path, lost, puts):
-    """Whatever is lost of the end of the file, with the header of a save that is not there, and one line half written."""
+    """Whatever is lost at the end of the file, with the header of a save that is not there, and one line half written."""
     whole = written(tmp_path, name="whole.usdc").read_bytes()
     part = written(tmp_path, log_in(tmp_path), until=8)
     with open(part, "r+b") as file:
@@ -65,7 +65,7 @@ def test_a_page_that_a_power_cut_took_is_missed(tmp_path):
 
 
 def test_a_page_that_begins_with_zeros_is_missed(tmp_path):
-    """As velocities of hair do of which some stands still."""
+    """Like velocities of hair if some of it stands still."""
     file = tmp_path / "values"
     values = np.ones(9000, np.uint64)
     values[::512] = 0
@@ -76,12 +76,12 @@ def test_a_page_that_begins_with_zeros_is_missed(tmp_path):
         changed[512 * lost : 512 * (lost + 1)] = 0
         file.write_bytes(changed.tobytes())
         assert save_log._trace(file, HEADER, 71_997) != before
-    file.write_bytes(bytes(HEADER) + values.tobytes()[HEADER:])  # which is another one after the next save
+    file.write_bytes(bytes(HEADER) + values.tobytes()[HEADER:])  # the header differs after the next save
     assert save_log._trace(file, HEADER, 71_997) == before
 
 
 def test_a_page_that_fell_back_to_the_save_before_is_missed(tmp_path):
-    """Values begin in the midst of a page that was on the disk already."""
+    """Values begin in the middle of a page that was already on the disk."""
     early = written(tmp_path, until=2, name="early.usdc").read_bytes()
     part = written(tmp_path, log_in(tmp_path), until=8)
     begin = json.loads((tmp_path / "saves").read_text().splitlines()[2][9:])["begin"]

@@ -29,7 +29,7 @@ def test_simulated_hair_starts_at_rest_moves_and_keeps_its_length(tmp_path):
 
 
 def test_what_follows_simulated_hair_is_kept_out_of_the_body(tmp_path, monkeypatch):
-    """And what is simulated stays as the solver has it. A report card tells of both."""
+    """And simulated strands stay as the solver has them. A report card covers both."""
     shot, points, cards = write_shot(tmp_path, Recipe(strands=160, vertices=24, frames=20)), [], []
     for name in ("free", "kept"):
         if name == "free":
@@ -50,7 +50,7 @@ def test_what_follows_simulated_hair_is_kept_out_of_the_body(tmp_path, monkeypat
 
 
 def test_what_would_take_for_ever_or_means_nothing_is_refused(tmp_path):
-    """Frames far from the animation, from which the solver starts, ended in a traceback or in no memory."""
+    """Frames far from the animation, where the solver starts, would end in a traceback or exhaust the memory."""
     shot = write_shot(tmp_path)
     for wrong, said in (
         ({"frames": "1e308:1e308"}, "10000 are the most"),
@@ -66,7 +66,7 @@ def test_what_would_take_for_ever_or_means_nothing_is_refused(tmp_path):
 
 
 def test_simulation_begins_with_the_animation_whatever_frames_are_wanted(tmp_path):
-    """So that parts of a range are the whole; before it, hair is at rest."""
+    """So parts of a range equal the whole; before the animation, hair is at rest."""
     shot = write_shot(tmp_path, Recipe(strands=6))
     early, late = (
         simulate(shot, tmp_path / f"{name}.usdc", strands=6, frames=frames).path
@@ -79,7 +79,7 @@ def test_simulation_begins_with_the_animation_whatever_frames_are_wanted(tmp_pat
 
 
 def test_a_loop_ends_as_it_begins(tmp_path):
-    """And its frames are the same, whichever are wanted."""
+    """And its frames are the same, whichever are asked for."""
     shot = write_loop(tmp_path)
     whole, part = (
         simulate(shot, tmp_path / f"{name}.usdc", strands=6, loop=True, frames=frames).path

@@ -71,7 +71,7 @@ def test_a_frame_that_is_cut_short_while_it_is_used_is_one_line(tmp_path):
 
 
 def test_a_frame_is_written_over_one_that_nothing_needs_any_more(tmp_path):
-    """Also over a longer one, of another groom."""
+    """Also over a longer frame, of another groom."""
     spool = Spool(tmp_path / "bake.usdc", "a")
     spool.write(0, 1.0, np.ones((50, 3)))
     for code in (1.0, 2.0):
@@ -82,7 +82,7 @@ def test_a_frame_is_written_over_one_that_nothing_needs_any_more(tmp_path):
     spool.write(0, 3.0, np.ones((50, 3)))
     spool.forget(0, 3.0)
     spool.close()
-    assert not list(spool.folder.glob("*.part"))  # what was stopped leaves nothing that nobody goes on from
+    assert not list(spool.folder.glob("*.part"))  # a stopped bake leaves only files to resume from
     again = Spool(tmp_path / "bake.usdc", "a")
     assert again.holds(1, 1.0, 9) and (read(again, 1.0, slice(0, 9), batch=1) == 2).all()
     again.discard()
@@ -110,7 +110,7 @@ def test_folders_and_links_in_the_place_of_frames_make_way(tmp_path):
 
 
 def test_a_link_in_the_place_of_the_folder_is_refused(tmp_path):
-    """Files of ours behind it may be somebody's."""
+    """Files with our names behind it may be somebody else's."""
     theirs = tmp_path / "theirs"
     theirs.mkdir()
     (theirs / "0_0x1p+0.frame").write_text("precious")
@@ -200,7 +200,7 @@ def test_a_folder_made_for_an_output_that_did_not_come_is_gone(tmp_path):
 
 
 def test_a_shot_edited_at_the_same_size_is_another_one(tmp_path):
-    """Frames of the shot as it was before must not be gone on from."""
+    """A bake must not resume from frames of the shot as it was before."""
     shot = tmp_path / "shot.usda"
     shot.write_text("a = 1")
     os.utime(shot, ns=(10**18, 10**18))

@@ -22,7 +22,7 @@ def test_velocities_are_those_of_the_points(tmp_path, model):
     first, second = (-3 * at[1] + 4 * at[2] - at[3]) * 12, (at[3] - at[1]) * 12
     for code, expected in ((5, middle), (1, first), (2, second)):
         assert np.allclose(samples(result.path, "velocities", at=code), expected, atol=5e-3)
-    # A half frame to both sides says nearly the same, in the middle of a smooth motion.
+    # A half frame to both sides gives nearly the same, in the middle of a smooth motion.
     few = bake(shot, tmp_path / "few.usdc", model, frames=[4.5, 5.5]).path
     near = (samples(few, "points", at=5.5).astype(float) - samples(few, "points", at=4.5)) * 24
     assert np.linalg.norm(near - middle) < 0.1 * np.linalg.norm(near)
@@ -66,7 +66,7 @@ def test_a_bake_without_velocities_hides_those_of_another(tmp_path, model):
 
 
 def test_hair_that_swings_on_after_the_last_sample_has_the_velocities_of_its_points(tmp_path):
-    """While the body stands, and whichever of these frames are baked."""
+    """While the body stands still, and whichever of these frames are baked."""
     shot, model = write_shot(tmp_path), write_random_model(tmp_path / "lively.neuralocks", gain=8.0)
     path = bake(shot, tmp_path / "bake.usdc", model, frames="7:15").path
     at, moving = ({code: samples(path, name, at=code).astype(float) for code in range(7, 16)} for name in NAMES)
@@ -90,7 +90,7 @@ def test_before_the_first_sample_hair_is_at_rest(tmp_path, model):
 
 @pytest.mark.parametrize("frames", [2, 3])
 def test_where_there_is_room_for_one_frame_only_velocities_are_the_way_to_it(tmp_path, model, frames):
-    """A clip of two frames, whose last has but the one before it; and half frames beside the ends of one of three."""
+    """A clip of two frames, whose last only has the one before it; and half frames next to the ends of a clip of three."""
     shot = write_shot(tmp_path, Recipe(frames=frames))
     path = bake(shot, tmp_path / "bake.usdc", model, frames=f"1:{frames}", subframes=2).path
     at = {code: samples(path, "points", at=code).astype(float) for code in np.arange(1, frames + 0.1, 0.5)}

@@ -16,7 +16,7 @@ from ..shots import Recipe, edited
 
 
 def _scaled(path: str, **samples):
-    """An edit that scales a prim: by `at_1=(1, 2, 1)` and so on, and else by `still`."""
+    """An edit that scales a prim: by `at_1=(1, 2, 1)` and so on, otherwise by `still`."""
 
     def edit(stage):
         op = UsdGeom.Xformable(stage.GetPrimAtPath(path)).AddScaleOp()
@@ -72,7 +72,7 @@ def test_what_a_reset_stack_shuts_out_is_not_named():
 
 
 def test_an_uneven_scale_above_is_not_that_of_a_hair_joint(tmp_path):
-    """`inspect` says of a rig what its bake does."""
+    """`inspect` says the same about a rig as its bake."""
     path = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(path))
     stage = Usd.Stage.Open(str(path))

@@ -20,7 +20,7 @@ from usd.cli.progress import progress_bar
 
 @pytest.fixture(autouse=True)
 def _heard():
-    """Whatever started the tests may have them deaf to Ctrl-C, as a shell's background jobs are."""
+    """The tests may have been started deaf to Ctrl-C, as a shell's background jobs are."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -43,7 +43,7 @@ def _swallowed() -> None:
 
 
 def _turned_into_another() -> None:
-    """As compiled modules do that call Python and forget to ask how it went."""
+    """As compiled modules do that call Python and do not check for errors."""
     try:
         _press()
     except KeyboardInterrupt as error:
@@ -114,11 +114,11 @@ def test_a_terminal_that_is_gone_is_told_nothing(monkeypatch):
 
 
 def test_ctrl_c_waits_while_modules_load(capsys):
-    """They stay half made where it breaks into their loading, and what is loaded next may crash."""
+    """Interrupting their loading leaves them half loaded, and what is loaded next may crash."""
     loaded = []
 
     def work():
-        """As a command that draws does."""
+        """As a drawing command does."""
         with deferred():
             _press()
             loaded.append("whole")

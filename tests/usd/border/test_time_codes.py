@@ -9,7 +9,7 @@ from usd.border.time_codes import time_codes
 
 @pytest.mark.parametrize("step", [0.1, 0.25, 0.3])
 def test_parts_of_a_range_have_the_numbers_of_the_whole(step):
-    """Or chunks of a farm, put together, have samples twice."""
+    """Otherwise a farm's chunks, put together, would have samples twice."""
     whole = time_codes(f"1:12:{step}", 0, 0)
     cut = whole[7]
     parts = [*time_codes(f"1:{cut - step / 2}:{step}", 0, 0), *time_codes(f"{cut}:12:{step}", 0, 0)]
@@ -27,7 +27,7 @@ def test_a_range_left_out_is_the_shots_in_its_own_frames():
 
 @pytest.mark.parametrize("frame", [1 / 24, 1 / 29.97, 1000 / 24, 1000 / 29.97])
 def test_frames_are_found_again_where_they_are_no_whole_numbers(frame):
-    """By the numbers that a bake wrote, and by those that are typed from what it told of them."""
+    """By the numbers that a bake wrote, and by those that are typed from its messages."""
     first = 2.5 * frame
     whole = time_codes(None, first, first + 15 * frame, frame=frame)
     assert len(whole) == 16

@@ -15,8 +15,8 @@ from usd.shot.notes import layer_notes
     [(24, 30, 1.0), (1000, 30, 1000 / 30), (1000, 0.5, 1000 / 24), (1000, 1000, 1.0), (8, 8, 1.0), (1, 1, 1 / 24)],
 )
 def test_a_frame_is_a_time_code_unless_these_are_too_fine(rate, shown, frame):
-    """Then it is one of the frames a second that the stage is shown with, or 24 where those cannot be meant; a stage that is
-    shown with as many frames as it counts time codes means these, but where it counts seconds.
+    """Then it follows the stage's framesPerSecond, or 24 if those make no sense; if framesPerSecond equals the time codes per
+    second, each time code is a frame, unless the stage counts seconds.
     """
     stage = Usd.Stage.CreateInMemory()
     stage.SetTimeCodesPerSecond(rate)
@@ -28,7 +28,7 @@ def test_a_frame_is_a_time_code_unless_these_are_too_fine(rate, shown, frame):
     ("rate", "shown", "told"), [(1000, 30, 0), (1000, 1000, 0), (24, None, 0), (1000, 0.5, 1), (1000, None, 1)]
 )
 def test_a_guessed_frame_is_told(rate, shown, told):
-    """A stage of milliseconds that does not say more is baked at 24 frames a second."""
+    """A stage in milliseconds that says nothing more is baked at 24 frames per second."""
     stage = Usd.Stage.CreateInMemory()
     stage.SetTimeCodesPerSecond(rate)
     if shown is not None:

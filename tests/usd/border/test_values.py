@@ -14,7 +14,7 @@ from ..shots import write_shot
 
 @pytest.fixture
 def made():
-    """Makes an attribute of a type, with a value."""
+    """Returns a function that makes an attribute of a type, with a value."""
     stage = Usd.Stage.CreateInMemory()
 
     def make(kind, value):

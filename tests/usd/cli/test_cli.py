@@ -43,7 +43,7 @@ def test_bake_is_the_python_function(tmp_path, model, capsys):
 
 
 def test_what_is_no_number_is_null_for_machines(tmp_path, model, capsys):
-    """A model of somebody else may hold NaN, which Python writes and no other program reads."""
+    """Somebody else's model may hold NaN, which Python writes but no other program reads."""
     odd = tmp_path / "odd.neuralocks"
     with zipfile.ZipFile(model) as old, zipfile.ZipFile(odd, "w") as new:
         for name in old.namelist():
@@ -69,7 +69,7 @@ def test_of_a_locale_that_is_no_utf_8_a_name_is_innocent(tmp_path):
 
 
 def test_what_is_printed_fits_the_code_page_of_where_it_goes(tmp_path, model):
-    """A redirected stdout is often no UTF-8; the card's frames ended in a traceback there."""
+    """A redirected stdout is often not UTF-8; the card's frames must not end in a traceback there."""
     shot, baked = write_shot(tmp_path), tmp_path / "髪.usdc"
     environment = {**os.environ, "PYTHONIOENCODING": "cp1252"}
     for words in (["bake", shot, "-o", baked, "--model", model], ["evaluate", baked]):
@@ -191,7 +191,7 @@ def test_help_comes_without_the_heavy_parts():
 
 
 def test_the_runtime_imports_only_what_inference_needs():
-    """Half a second to start is kept by what is not imported: no training, drawing or statistics."""
+    """A start in half a second needs few imports: no training, drawing or statistics."""
     absent = ("torch", "warp", "onnx", "bpy", "trimesh", "moderngl", "matplotlib", "PIL", "pandas", "sympy",
               "scipy.stats", "scipy.signal", "scipy.ndimage", "scipy.integrate")  # fmt: skip
     code = f"import sys; import %s; print([m for m in {absent} if m in sys.modules])"
@@ -234,7 +234,7 @@ def test_a_hair_file_becomes_a_usd_groom(tmp_path, capsys):
     assert len(counts) == told["grooms"][0]["strands"] == 2228 and sum(counts) == told["grooms"][0]["vertices"]
     uv = UsdGeom.PrimvarsAPI(prim).GetPrimvar("groom_root_uv")
     assert uv.GetInterpolation() == "uniform" and len(uv.Get()) == 2228
-    # And once more through USD: nothing changes but the file.
+    # And once more through USD: nothing changes except the file.
     again, _ = import_groom(tmp_path / "groom.usdc", tmp_path / "again.usda")
     points = np.asarray(UsdGeom.BasisCurves(prim).GetPointsAttr().Get())
     assert np.array_equal(again[0].points, points)

@@ -11,7 +11,7 @@ from ..shots import write_shot
 
 
 def test_plain_onnx_with_its_description(tmp_path, model, capsys):
-    """Of the shipped model, where none is named."""
+    """For the shipped model, if none is named."""
     import onnxruntime
 
     assert status("export", "-o", tmp_path) == 0
@@ -46,7 +46,7 @@ def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, 
 
 
 def test_a_graph_of_something_else_is_not_written_over(tmp_path, capsys):
-    """An earlier export is."""
+    """An earlier export may be overwritten."""
     (tmp_path / "tail.onnx").write_text("mine")
     assert status("export", "-o", tmp_path) == 1
     assert "tail.onnx: belongs to something else" in capsys.readouterr().err

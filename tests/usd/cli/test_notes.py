@@ -13,7 +13,7 @@ from ..shots import Recipe, write_shot
 
 
 def test_what_spoils_a_bake_is_told_once_before_hair_is_posed(tmp_path, model, capsys, monkeypatch):
-    """Not after the minutes that it saves."""
+    """Not after the minutes that the note could save."""
     shot, told, poser = write_shot(tmp_path, Recipe(unit=0.01, frames=1, strands=4)), [], GroomPoser.__init__
     shot.write_text(shot.read_text().replace("metersPerUnit = 0.01", "metersPerUnit = 1"))
 

@@ -35,7 +35,7 @@ def test_the_time_before_work_gets_going_is_not_taken_for_its_speed(monkeypatch,
 
 
 def test_what_a_bake_prepares_is_not_taken_for_its_speed(tmp_path, model, monkeypatch, capsys):
-    """A minute before the first frame, a second for each: nobody waits for hours."""
+    """A minute before the first frame, a second for each: the estimate is not hours."""
     clock, poser, points = [0.0], GroomPoser.__init__, GroomPoser.points
 
     def begun(*args, **options):

@@ -70,7 +70,7 @@ def test_settings_are_words_for_fields():
 
 
 def test_what_was_reached_is_told(tmp_path, capsys, monkeypatch):
-    """In one line beside rigid hair and the model that it began with; all of it for machines."""
+    """In one line, compared with rigid hair and the model that it began with; in full for machines."""
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
     plain = model_file.read(write_random_model(tmp_path / "plain.neuralocks", 1.0))
     held = {"motion": 0.314, "motion_ratio": 0.91, "position": 2.13, "rigid": 9.9}

@@ -42,7 +42,7 @@ def test_names_that_are_no_text_are_refused_in_one_line(tmp_path, model, capsys)
 
 
 def test_a_folder_whose_name_is_no_text_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
-    """Of a file in the current folder, too, whose whole path USD asks for."""
+    """Also for a file in the current folder, because USD asks for its whole path."""
     odd = tmp_path / os.fsdecode(b"shots\xff")
     try:
         odd.mkdir()
@@ -58,7 +58,7 @@ def test_a_folder_whose_name_is_no_text_is_refused_in_one_line(tmp_path, monkeyp
 
 
 def test_an_empty_word_is_refused(tmp_path, capsys):
-    """What a script's variable that was never set leaves behind: `--head ""` was as good as no --head."""
+    """As an unset variable of a script leaves: otherwise `--head ""` would be like no --head."""
     for words in (
         ("bake", "s.usda", "-o", "o.usdc", "--head", ""),
         ("rig", "inspect", "s.usda", "--chains", " "),
@@ -71,7 +71,7 @@ def test_an_empty_word_is_refused(tmp_path, capsys):
 
 
 def test_a_name_is_given_a_value_once(capsys):
-    """The last one of two won in silence."""
+    """Otherwise the last of two would win silently."""
     for words, name in (
         (("bake", "s.usda", "-o", "o.usdc", "--joint", "neck=a", "--joint", "neck=b"), "--joint neck=b: neck"),
         (("body", "-o", "o.usda", "--phenotype", "age=1", "--phenotype", "age=2"), "--phenotype age=2: age"),

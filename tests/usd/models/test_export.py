@@ -54,7 +54,7 @@ def test_the_history_told_is_that_of_the_model(tmp_path, linear, chest, told):
 
 @pytest.mark.parametrize(("kind", "entry"), [("strands", "boundary vector"), ("rig", "features")])
 def test_all_that_the_history_names_is_in_the_description(tmp_path, kind, entry):
-    """And what becomes of it where motion is held, ends, or goes round."""
+    """And what happens to it where motion is held, ends, or loops."""
     export_model(model_file.shipped(kind), tmp_path, write_shot(tmp_path) if kind == "strands" else None)
     text = (tmp_path / "description.json").read_text("utf-8")
     history = json.loads(text)[entry]["how"]["history"]
@@ -72,7 +72,7 @@ def test_the_description_of_a_rig_holds_no_weights(tmp_path):
 
 
 def test_a_rig_is_fed_as_its_description_says(tmp_path):
-    """A held pose, from the text alone: the first two columns of what neck and upper chest are turned against the head."""
+    """A held pose, from the text alone: the first two columns of the rotation of neck and upper chest relative to the head."""
     export_model(model_file.shipped("rig"), tmp_path)
     described = json.loads((tmp_path / "description.json").read_text("utf-8"))["features"]
     head, neck, chest = from_vector(np.random.default_rng(0).normal(0, 0.4, (3, 3)))

@@ -53,7 +53,7 @@ def test_what_is_named_is_taken_or_refused(tmp_path):
 
 
 def test_what_a_training_should_know_is_told_before_it(tmp_path):
-    """Of several skeletons the first is taken, and motion is that of the one with the character's joints."""
+    """Of several skeletons, the first is taken; motion is taken from the one with the character's joints."""
     path = write_shot(tmp_path, Recipe(bound="mesh", strands=MOST_STRANDS + 40, vertices=3))
     stage = Usd.Stage.Open(str(path))
     layer = stage.GetRootLayer()
@@ -102,7 +102,7 @@ def test_of_a_shot_of_several_characters_only_the_own_hair_is_learned(tmp_path):
 
 
 def test_motion_of_a_character_whose_head_has_another_name_needs_no_second_word(tmp_path):
-    """The character's head is named with --head; what moves it are the same joints."""
+    """The character's head is named with --head; the motion has the same joints."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     layer = Sdf.Layer.FindOrOpen(str(path))
     for prim in ("/Hero/Rig", "/Hero/Rig/Motion"):

@@ -44,7 +44,7 @@ def test_a_moving_bake_moves_and_keeps_its_lengths(tmp_path, model):
     values = next(iter(evaluate(tmp_path / "moving.usdc").grooms.values()))
     assert values["speed_cm_s"] > 0.02 and values["swing_percent"] > 0.02
     assert values["energy_bend"] > 0
-    # Hair of exact length stores nothing by stretch, however finer than the network's vertices it winds.
+    # Hair of exact length stores no stretch energy, however much finer than the network's vertices it winds.
     assert values["stretch_percent_max"] < 0.01 and values["energy_stretch"] < 1e-5
 
 
@@ -78,7 +78,7 @@ def test_a_part_of_a_shot_is_compared_with_hair_that_knows_what_came_before(tmp_
 
 
 def test_a_loop_is_compared_with_a_loop(tmp_path, model):
-    """Else the reference begins at rest where the bake remembers the end, and takes the loop's seam for a stop."""
+    """Otherwise the reference begins at rest where the bake remembers the end, and takes the loop's seam as a stop."""
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
     shot, off = write_loop(tmp_path), {}
     for loop in (False, True):
@@ -89,7 +89,7 @@ def test_a_loop_is_compared_with_a_loop(tmp_path, model):
 
 
 def test_a_simulation_is_compared_with_the_solver_as_it_was(tmp_path):
-    """Which keeps strands apart where the bake tells so."""
+    """The solver keeps strands apart if the bake records that."""
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
     shot = write_shot(tmp_path, Recipe(frames=24, vertices=24))
     for volume in (0.0, 3.0):
@@ -99,7 +99,7 @@ def test_a_simulation_is_compared_with_the_solver_as_it_was(tmp_path):
 
 
 def coiled(path, strands=12, vertices=150):
-    """Make the groom of a shot one of coils: ten turns of 8 mm radius on straight lines of 20 cm."""
+    """Make a shot's groom coils: ten turns of 8 mm radius on straight lines of 20 cm."""
     stage = Usd.Stage.Open(str(path))
     curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
     share = np.linspace(0, 1, vertices)
@@ -113,7 +113,7 @@ def coiled(path, strands=12, vertices=150):
 
 
 def test_of_coils_the_motion_of_their_lines_is_measured(tmp_path):
-    """Which is what the solver moved: its own bake is neither wrong nor crinkled."""
+    """The solver moves the lines: its own bake is neither wrong nor crinkled."""
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
     shot = coiled(write_shot(tmp_path, Recipe(frames=24, strands=12)))
     simulate(shot, tmp_path / "hair.usdc")
@@ -158,7 +158,7 @@ def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch, caps
 
 
 def test_only_what_was_baked_is_measured(tmp_path, model):
-    """A beard that the same skeleton still skins: its points stand at rest, and are no bake."""
+    """A beard that the same skeleton still skins: its points are at rest, and not a bake."""
     stage = Usd.Stage.Open(str(write_shot(tmp_path)))
     Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Beard")
     stage.GetRootLayer().Save()
@@ -169,7 +169,7 @@ def test_only_what_was_baked_is_measured(tmp_path, model):
 
 
 def test_each_groom_is_measured_at_its_own_samples(tmp_path, model):
-    """Between its samples and after them a groom is drawn along chords, or stands still in a character that goes on."""
+    """Between its samples a groom is drawn along chords, and after them it stands still on a character that moves on."""
     stage = Usd.Stage.Open(str(write_shot(tmp_path)))
     Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Beard")
     stage.GetRootLayer().Save()
@@ -200,7 +200,7 @@ def test_of_several_grooms_progress_says_which_is_measured(tmp_path, model):
 
 
 def test_the_material_of_a_bake_is_known_from_the_bake(tmp_path, model):
-    """Through a layer on top, too; a given one wins, and one that is none is told."""
+    """Also through a layer on top; a given material wins, and an invalid one is reported."""
     shot, out, above = write_shot(tmp_path), tmp_path / "hair.usdc", tmp_path / "above.usda"
     soft = Material(bend=4e-4, weight=1.5)
     bake(shot, out, model, material=soft, strength=0.5)
@@ -223,7 +223,7 @@ def test_the_material_of_a_bake_is_known_from_the_bake(tmp_path, model):
 
 
 def test_a_bake_over_a_bake_tells_of_itself_alone(tmp_path, model):
-    """USD composes dictionaries of all layers into one: what the lower bake was made with would shine through."""
+    """USD composes dictionaries of all layers into one: the lower bake's options would show through."""
     bake(write_shot(tmp_path), tmp_path / "hair.usdc", model, material=Material(bend=4e-4))
     below = Sdf.Layer.FindOrOpen(str(tmp_path / "hair.usdc"))
     record(below.GetPrimAtPath("/Hero/Hair"), {"solver": "rods"})

@@ -16,7 +16,8 @@ from ..shots import Recipe, write_shot
 
 RADIUS, LENGTH = 0.15, 0.2
 WANTED = 0.5 * Material().bend / RADIUS**2
-"""Of a straight rod bent to a circle [J/kg]; a polyline of n vertices bends at n - 2 of them, each for its n - 1th part."""
+"""Energy of a straight rod bent to a circle [J/kg]; a polyline of n vertices bends at n - 2 of them, each for 1 / (n - 1) of the
+rod."""
 
 
 def straight(counts):

@@ -9,7 +9,7 @@ from ..rig_shots import small_shot
 
 @pytest.fixture
 def edited(tmp_path):
-    """Makes a small shot in which a function changed the stage."""
+    """Makes a small shot whose stage a function has changed."""
 
     def make(change, **options):
         path = small_shot(tmp_path / "shot.usda", **options)

@@ -15,7 +15,7 @@ from ..rig_shots import hair_turns, model_for, small_shot
 
 @pytest.fixture
 def folder(tmp_path):
-    """A bake `hair.usda` of `shot.usda`, and `new.usda`, which goes over either with a head that is turned more."""
+    """A bake `hair.usda` of `shot.usda`, and `new.usda`, which goes over either and turns the head more."""
     shot = small_shot(tmp_path / "shot.usda")
     bake_rig(shot, tmp_path / "hair.usda", model_for(read_rigged_hair(shot)))
     new = Sdf.Layer.CreateNew(str(tmp_path / "new.usda"))
@@ -51,7 +51,7 @@ def test_an_updated_animation_reaches_a_bake_over_an_old_one(folder):
 
 
 def test_whoever_reads_the_copy_is_told_that_it_is_old(folder):
-    """Renderers show it, and strands must fit what they show."""
+    """Renderers show the copy, and strands must fit what they show."""
     old = "/Who/Rig: its animation NeuralocksHair is a rig bake of /Who/Motion, which has changed since; bake the rig again"
     assert old in inspect(folder / "on_hair.usda")["spoils"]
     assert not any("changed since" in note for note in inspect(folder / "hair.usda")["spoils"])

@@ -37,7 +37,7 @@ def test_hair_hangs_as_the_hat_moves_that_carries_it(tmp_path):
 
 
 def test_a_hat_that_is_hair_of_the_model_is_none(tmp_path):
-    """What a bake moves carries nothing: its motion in the shot is written over."""
+    """A joint that the bake moves carries nothing: its motion in the shot is overwritten."""
     shot = tipped(tmp_path / "hat.usda")
     with pytest.raises(NeuralocksError, match="its head joint 'head' is not animated"):
         bake_rig(shot, tmp_path / "out.usda", model_for(read_rigged_hair(shot)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The exported header in a small engine, which reads a stage by USD's own means, beside a bake of the same shot."""
+"""The exported header in a small engine that reads a stage with USD alone, compared with a bake of the same shot."""
 
 import subprocess
 
@@ -60,7 +60,7 @@ class Rig:
         self.bind = np.array(self.query.GetJointWorldBindTransforms())
 
     def world(self, code):
-        """(J, 4, 4), rows are the axes: USD multiplies row vectors."""
+        """(J, 4, 4), with axes as rows: USD multiplies row vectors."""
         return np.array(self.query.ComputeJointSkelTransforms(code))
 
     def since_bind(self, code, joint):

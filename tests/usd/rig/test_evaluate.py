@@ -53,7 +53,7 @@ def test_swing_is_what_usd_shows(tmp_path, scale, z_up):
 
 
 def test_depths_are_those_of_a_known_body(tmp_path):
-    """A wall 5 mm behind where the tail rests: how much of it goes in, and how deep, is known of each vertex."""
+    """A wall 5 mm behind the tail's rest place: for each vertex it is known whether it goes in, and how deep."""
     shot = small_shot(tmp_path / "shot.usda")
     baked = bake_rig(shot, tmp_path / "baked.usda", model_for(read_rigged_hair(shot))).path
     stage = Usd.Stage.Open(str(baked))
@@ -91,7 +91,7 @@ def test_a_bake_keeps_hair_out_and_rests_and_the_command_says_so(tmp_path, capsy
 
 
 def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
-    """Five chains, some of them in the head already at rest, one deep, which a blend shape swells by a centimetre."""
+    """Five chains, some already in the head at rest, one of them deep; a blend shape swells the head by a centimetre."""
     path, codes = tmp_path / "shot.usda", range(1, FRAMES + 1)
     write_character(path, 24)
     stage = Usd.Stage.Open(str(path))
@@ -185,7 +185,7 @@ def test_of_several_characters_the_baked_one_is_measured_and_others_are_told(tmp
 
 @pytest.mark.parametrize(("code", "told"), [(52, False), (53, True)])
 def test_a_held_pose_rests(tmp_path, code, told):
-    """The head stands still from frame 5 on: hair of held poses does, too, and what trembles two seconds later is told."""
+    """The head stands still from frame 5 on: quasi-static hair does, too, and trembling two seconds later is reported."""
     shot = small_shot(tmp_path / "shot.usda", frames=96)
     stage = Usd.Stage.Open(str(shot))
     turns = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
@@ -200,7 +200,7 @@ def test_a_held_pose_rests(tmp_path, code, told):
     rotations[2] = type(rotations[2])(np.cos(0.005), np.sin(0.005), 0, 0) * rotations[2]
     turns.Set(rotations, code)
     stage.GetRootLayer().Save()
-    # By a hundredth of a radian about the first joint, from which the farthest vertex is 0.15 m away.
+    # A hundredth of a radian about the first joint, from which the farthest vertex is 0.15 m away.
     jitter = evaluate_rig(baked).measures["jitter_mm"]
     assert 0.5 < jitter < 1.6 if told else jitter == 0
 

@@ -18,7 +18,7 @@ from ..rig_shots import EXAMPLE, model_for
 
 @pytest.fixture
 def rebound(tmp_path):
-    """Makes a copy of the example's shot in which a function changed names and bind transforms of the joints."""
+    """Makes a copy of the example's shot with joint names and bind transforms changed by a function."""
 
     def make(change):
         path = tmp_path / "shot.usdc"
@@ -68,7 +68,7 @@ def test_a_bind_pose_that_faces_otherwise_is_told(rebound, change, words):
 
 
 def test_a_trained_model_knows_which_way_its_rig_faces(rebound, tmp_path, monkeypatch):
-    """The header says it; whoever trains is told before."""
+    """The header says so; whoever trains is told before."""
     pytest.importorskip("torch")
     shot, told = rebound(_askew), []
     hair = read_rigged_hair(shot)

@@ -21,7 +21,7 @@ from ..rig_shots import rotations  # noqa: E402
 
 
 def trained(hair, dynamic) -> RigModel:
-    """A few steps: what it has learned does not matter, that it comes out whole does."""
+    """A few steps: what it has learned does not matter, only that it comes out whole."""
     if dynamic:
         return train_dynamic(hair.rig, steps=3, clips=2, clip_seconds=1.0, batch=8, report_poses=0)
     return train_static(hair.rig, steps=3, batch=4, report_poses=0)
@@ -59,13 +59,13 @@ def test_train_bake_export(tmp_path, joints, dynamic):
         a, b = rotations(own, code), rotations(new, code)
         assert (a[~is_hair] == b[~is_hair]).all()
         assert code == 1 or (a[is_hair] != b[is_hair]).any(axis=1).all()
-    # The shot begins in the bind pose, at rest: there the network gives no turn, whatever the joints' orients.
+    # The shot begins in the bind pose, at rest: there the network gives zero rotation, whatever the joints' orients.
     flip = np.sign(np.sum(rotations(own, 1) * rotations(new, 1), axis=1, keepdims=True))
     assert np.abs(rotations(own, 1) - flip * rotations(new, 1)).max() < (2e-2 if dynamic else 1e-5)
 
 
 def test_names_whose_letters_an_exporter_lost_are_told_as_such(tmp_path):
-    """Blender before 5.0 writes '_' for each byte of a Japanese name, so that those of one length are the same."""
+    """Blender before 5.0 writes '_' for each byte of a Japanese name, so names of one length become the same."""
     write_character(tmp_path / "who.usda", 24)
     stage = Usd.Stage.Open(str(tmp_path / "who.usda"))
     joints = UsdSkel.Skeleton(stage.GetPrimAtPath("/Fbx/Armature")).GetJointsAttr()
@@ -77,7 +77,7 @@ def test_names_whose_letters_an_exporter_lost_are_told_as_such(tmp_path):
 
 
 def test_names_that_are_no_paths_are_refused(tmp_path):
-    """A ':' of a namespace is told in one line: UsdSkel and every importer would see no joint at all."""
+    """A ':' of a namespace is reported in one line: UsdSkel and every importer would see no joints at all."""
     write_character(tmp_path / "who.usda", 24, prefix="rig:")
     with pytest.raises(NeuralocksError, match="rig:Hips.*rename"):
         read_rigged_hair(tmp_path / "who.usda")

@@ -48,7 +48,7 @@ def _retyped(name: str, kind, value):
     ],
 )
 def test_channels_of_another_type_are_those_that_usd_ignores(edited, tmp_path, name, kind, value):
-    """Read all the same, the body would begin to move in the bake."""
+    """If they were read all the same, the body would begin to move in the bake."""
     model = model_for(read_rigged_hair(small_shot(tmp_path / "plain.usda")))
     shot = edited(_retyped(name, kind, value))
     with pytest.raises(NeuralocksError, match=f"/Who/Motion: its {name} are .*UsdSkel ignores the animation; author "):
@@ -72,7 +72,7 @@ def test_rotations_that_stretch_are_told(edited):
 
 
 def test_a_neck_without_its_name_can_be_named(edited, tmp_path):
-    """The network reads the neck: which joint that is changes the hair, so it is told where it was not found."""
+    """The network reads the neck: which joint that is changes the hair, so there is a note if it was not found."""
 
     def change(stage):
         skeleton, motion = UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig")), stage.GetPrimAtPath("/Who/Motion")
@@ -98,7 +98,7 @@ def test_a_neck_without_its_name_can_be_named(edited, tmp_path):
 
 @pytest.mark.parametrize(("letters", "told"), [(21, False), (22, True)])
 def test_a_name_that_blender_cuts_is_told(edited, tmp_path, letters, told):
-    """It counts bytes, of which each of these letters has three."""
+    """Blender counts bytes, and each of these letters has three."""
 
     def change(stage):
         for prim in ("Rig", "Motion"):
@@ -125,7 +125,7 @@ def test_a_pattern_that_stands_for_nothing_is_refused(tmp_path):
 
 
 def test_what_is_wrong_with_a_rig_is_told_by_its_own_commands(tmp_path):
-    """As `inspect` tells it; joints that no bone model reads are left out."""
+    """As `inspect` reports it; joints that no bone model reads are left out."""
     shot = small_shot(tmp_path / "shot.usda", scale=100.0)
     told = inspect(shot)["spoils"]
     assert not any("shoulder" in note for note in told)
@@ -180,7 +180,7 @@ def test_hair_that_the_animation_mirrors_is_told(edited, tmp_path):
 
 @pytest.mark.parametrize("dynamic", [True, False])
 def test_a_joint_that_a_scale_of_zero_hides_for_some_frames_is_named(edited, tmp_path, dynamic):
-    """By a bake, and by `inspect`, which is asked before; of joints that are not read nothing is said."""
+    """By a bake, and by `inspect` before it; joints that are not read get no message."""
 
     def hide(stage, joint):
         motion = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion"))

@@ -40,7 +40,7 @@ def test_a_range_that_cannot_be_meant_gives_way_to_the_animations(tmp_path, firs
 
 
 def test_a_held_head_is_that_of_a_held_pose(tmp_path):
-    """Reading, or in a still: the hair hangs from the bent head as it does in a shot that passes through the pose."""
+    """Somebody who reads, or a still: the hair hangs from the bent head as it does in a shot that passes through the pose."""
     moving = small_shot(tmp_path / "moving.usda")
     model = model_for(read_rigged_hair(moving))
     stage = Usd.Stage.Open(str(small_shot(tmp_path / "held.usda")))
@@ -59,7 +59,7 @@ def test_a_held_head_is_that_of_a_held_pose(tmp_path):
 
 
 def test_joints_elsewhere_may_have_the_names_of_hair_joints(tmp_path):
-    """A tail's are no hair's: rigs name every chain hair_0, joint1."""
+    """A tail's joints are not hair's: rigs name every chain hair_0, joint1."""
     plain = small_shot(tmp_path / "plain.usda")
     model = model_for(read_rigged_hair(plain))
     text = small_shot(tmp_path / "tailed.usda").read_text()
@@ -79,8 +79,8 @@ def test_joints_elsewhere_may_have_the_names_of_hair_joints(tmp_path):
 
 
 def test_a_body_that_nothing_animates_stays_where_it_rests(tmp_path):
-    """Where a parent moves the character, the bake's animation lists hair joints alone: rest scales have more digits than
-    an animation's.
+    """If a parent moves the character, the bake's animation lists only hair joints: rest scales have more digits than an
+    animation's.
     """
     shot = small_shot(tmp_path / "shot.usda")
     stage = Usd.Stage.Open(str(shot))
@@ -101,7 +101,7 @@ def test_a_body_that_nothing_animates_stays_where_it_rests(tmp_path):
 
 
 def test_hair_with_a_skeleton_of_its_own_is_told_what_it_needs(tmp_path):
-    """Not that the body's skeleton, which comes first, has no hair; with the joint named it is read."""
+    """The message is not that the body's skeleton, which comes first, has no hair; with the joint named, it is read."""
     stage = Usd.Stage.Open(str(small_shot(tmp_path / "shot.usda")))
     Sdf.CopySpec(stage.GetRootLayer(), "/Who/Rig", stage.GetRootLayer(), "/Who/Wig")
     body, wig = (UsdSkel.Skeleton(stage.GetPrimAtPath(f"/Who/{name}")) for name in ("Rig", "Wig"))
@@ -117,7 +117,7 @@ def test_hair_with_a_skeleton_of_its_own_is_told_what_it_needs(tmp_path):
 
 
 def test_an_animation_that_usd_ignores_is_named_as_such(tmp_path):
-    """With rotations alone UsdSkel shows the rest pose: it is not that nobody animated the head."""
+    """With rotations alone, UsdSkel shows the rest pose: the message does not say that nobody animated the head."""
     model = model_for(read_rigged_hair(small_shot(tmp_path / "shot.usda")))
     stage = Usd.Stage.Open(str(tmp_path / "shot.usda"))
     stage.GetPrimAtPath("/Who/Motion").RemoveProperty("scales")
@@ -139,7 +139,7 @@ def test_an_animation_that_is_switched_off_is_not_played(tmp_path):
 
 
 def test_weights_that_do_not_sum_to_one_are_noted(tmp_path):
-    """They are read as if they did."""
+    """They are read as if they summed to one."""
     hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.5))
     assert "do not sum to one" in weight_notes(hair.source)[0]
     assert hair.rig.weights.sum(axis=1) == pytest.approx(1)

@@ -31,7 +31,7 @@ def test_a_model_for_another_rig_is_refused(tmp_path):
 
 @pytest.mark.parametrize("without", ["hidden", "inactive", "coarse"])
 def test_the_hairs_mesh_need_not_be_there(tmp_path, without):
-    """A model knows its joints: hidden hair, a stage of animation alone and a level of detail whose last joints move nothing are
+    """A model knows its joints: hidden hair, a stage with only animation, and a level of detail whose last joints move nothing are
     baked like the whole.
     """
     plain = small_shot(tmp_path / "plain.usda")
@@ -60,7 +60,7 @@ def test_a_joint_that_hangs_from_another_one_is_not_the_models(tmp_path):
 
 
 def test_a_frame_beside_a_sample_by_rounding_is_that_sample(tmp_path):
-    """Both would be two samples, of which no program can tell the times apart."""
+    """Otherwise there would be two samples whose times no program can tell apart."""
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot))
     stage = Usd.Stage.Open(str(shot))
@@ -74,7 +74,7 @@ def test_a_frame_beside_a_sample_by_rounding_is_that_sample(tmp_path):
 
 
 def test_what_the_body_is_at_no_time_stays(tmp_path):
-    """Values at the default time beside samples are what a viewer shows that asks for no time."""
+    """A viewer that asks for no time shows the values at the default time, which exist besides samples."""
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot))
     stage = Usd.Stage.Open(str(shot))
@@ -105,7 +105,7 @@ def test_joints_that_only_begin_otherwise_are_the_models(tmp_path, prefix):
 
 
 def test_joint_orients_cancel(tmp_path):
-    """A rig that went through another exporter has other axes; a model of the first moves its hair the same in space."""
+    """A rig that went through another exporter has other axes; the original rig's model moves its hair the same in space."""
     plain = small_shot(tmp_path / "plain.usda")
     orient = from_vector(np.array([1.2, -0.4, 2.0]))
     other = small_shot(tmp_path / "other.usda", orient=orient)
@@ -121,7 +121,7 @@ def test_joint_orients_cancel(tmp_path):
 
 @pytest.mark.parametrize("first", [0, 1], ids=["all", "head and hair"])
 def test_mirrored_joints_move_alike(tmp_path, first):
-    """Axes of negative scale, which some rigs have from the root or from the head on, are a matter of the file alone."""
+    """Axes of negative scale, which some rigs have from the root or the head on, only concern the file."""
     orient = from_vector(np.array([1.2, -0.4, 2.0]))
     plain = small_shot(tmp_path / "plain.usda", orient=orient)
     model, places = model_for(read_rigged_hair(plain)), []
@@ -157,7 +157,7 @@ def test_another_unit_is_told_as_such(tmp_path, size, told):
 
 
 def _sized(folder, size):
-    """The small shot in a stage whose unit makes it so many times as large."""
+    """The small shot in a stage whose unit makes it `size` times as large."""
     shot = small_shot(folder / "sized.usda", scale=100.0)
     stage = Usd.Stage.Open(str(shot))
     UsdGeom.SetStageMetersPerUnit(stage, 0.01 * size)

@@ -15,7 +15,7 @@ from ..shots import write_shot
 
 
 def test_a_picture_of_mesh_hair(tmp_path):
-    """Whole locks are hair, their roots on the head too, and nothing of the body is; hair that moves is drawn elsewhere."""
+    """Whole locks are hair, including their roots on the head, and nothing of the body is; hair that moves is drawn elsewhere."""
     pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
     from PIL import Image
 
@@ -23,7 +23,7 @@ def test_a_picture_of_mesh_hair(tmp_path):
 
     baked = tmp_path / "baked.usda"
     bake_rig(EXAMPLE / "shot.usda", baked)
-    stage = Usd.Stage.Open(str(baked))  # a cable in the set, which is no hair
+    stage = Usd.Stage.Open(str(baked))  # a cable in the set, which is not hair
     cable = UsdGeom.BasisCurves.Define(stage, "/Set/Cable")
     cable.CreatePointsAttr([(3, 0, 0), (3, 4, 0)])
     cable.CreateCurveVertexCountsAttr([2])

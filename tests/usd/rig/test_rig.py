@@ -64,7 +64,7 @@ def test_a_channel_keeps_both_its_samples_and_what_it_shows_at_no_time(tmp_path)
 
 
 def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path):
-    """As of strands, see test_bake.py."""
+    """As for strands, see test_bake.py."""
     for name in ("show", "layout", "cache"):
         (tmp_path / name).mkdir()
     model = model_for(read_rigged_hair(small_shot(tmp_path / "show" / "who.usda")))
@@ -92,7 +92,7 @@ def test_units_axes_and_rates_cancel(tmp_path):
 
 
 def test_a_scale_keyed_once_is_a_scale(tmp_path):
-    """An FBX armature of size 0.01 leaves Blender with one time sample of it and no default value."""
+    """Blender exports the scale of an FBX armature, 0.01, as one time sample without a default value."""
     wanted = describe_chains(read_rigged_hair(small_shot(tmp_path / "plain.usda")).rig.chains)
     stage = Usd.Stage.Open(str(small_shot(tmp_path / "fbx.usda", scale=100.0)))
     UsdGeom.SetStageMetersPerUnit(stage, 1)
@@ -102,7 +102,7 @@ def test_a_scale_keyed_once_is_a_scale(tmp_path):
 
 
 def test_ranges_cannot_change_a_sample(tmp_path):
-    """The same bytes twice, and the same samples whatever else is asked for; a dynamic model too."""
+    """The same bytes twice, and the same samples whatever else is asked for; also with a dynamic model."""
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot), dynamic=True)
     for name in ("a", "b"):
@@ -114,7 +114,7 @@ def test_ranges_cannot_change_a_sample(tmp_path):
 
 
 def test_a_loop_is_seamless(tmp_path):
-    """With --loop the last sample of a dynamic bake is the first one."""
+    """With --loop, the last sample of a dynamic bake equals the first one."""
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot), dynamic=True)
     result = bake_rig(shot, tmp_path / "out.usda", model, loop=True)
@@ -131,7 +131,7 @@ def test_a_loop_is_seamless(tmp_path):
 
 
 def test_hair_goes_on_in_a_loop_past_the_clip(tmp_path):
-    """The animation is of 24 frames; UsdSkel holds its last pose from there on."""
+    """The animation has 24 frames; UsdSkel holds its last pose from there on."""
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot), dynamic=True)
     bake_rig(shot, tmp_path / "out.usda", model, loop=True, frames="1:60")
@@ -141,7 +141,7 @@ def test_hair_goes_on_in_a_loop_past_the_clip(tmp_path):
 
 
 def test_hair_starts_anew_after_a_cut(tmp_path):
-    """Found and told, or given; the frames before it are what they are without it."""
+    """Detected and reported, or given; the frames before it are the same as without it."""
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot), dynamic=True)
     bake_rig(shot, tmp_path / "whole.usda", model)
@@ -208,12 +208,14 @@ def test_the_example_and_its_command_line(tmp_path):
 
 @pytest.mark.parametrize("path", [None, EXAMPLE / "quasi_static.neuralocks"], ids=["dynamic", "quasi_static"])
 def test_no_lock_of_the_shipped_networks_stands_out(path):
-    """Whatever the neck does: one that did, by 86 degrees in the mean, kept clear of every body and showed in no error of motion."""
+    """Whatever the neck does: a lock that stood out, by 86 degrees on average, would be clear of every body and not show in any
+    motion error.
+    """
     rig = read_rigged_hair(EXAMPLE / "character.usda").rig
     model = RigModel.load(path or model_file.shipped("rig"))
     turns = np.random.default_rng(0).uniform(-1, 1, (200, 2, 3)) * [0.5, 0.7, 0.4]
     neck = np.stack([from_vector(turns[:, 0]), from_vector(turns.sum(axis=1))], axis=1)
-    gravity = -neck[:, 1, :, 1]  # of an upright trunk
+    gravity = -neck[:, 1, :, 1]  # for an upright trunk
     quaternions = model.canonical_turns(held_features(model.spec, neck, gravity))
     angles = np.degrees(2 * np.arccos(np.clip(np.abs(quaternions[..., 0]), 0, 1))).mean(axis=0)
     assert quaternions.shape[1] == len(rig.chains) and 5 < angles.max() < 45

@@ -50,7 +50,7 @@ def test_every_character_with_the_models_chains_moves(crowd, tmp_path):
 
 
 def test_who_lacks_a_joint_of_the_model_is_named(tmp_path):
-    """Also where nothing but the model tells that the joints are hair."""
+    """Also if only the model shows that the joints are hair."""
     one = small_shot(tmp_path / "one.usda")
     text = Path(one).read_text().replace("hair_", "strip_")
     Path(one).write_text(text)
@@ -79,7 +79,7 @@ def test_where_no_character_can_move_the_first_says_why(crowd, tmp_path):
 
 
 def test_the_next_is_baked_from_the_bake_of_the_one_before(crowd, tmp_path):
-    """Where characters need different models: the last layer moves all of them."""
+    """If characters need different models: the last layer moves all of them."""
     shot, model, alone = crowd
     bake_rig(shot, tmp_path / "first.usda", model, skeleton="/A/Rig")
     bake_rig(tmp_path / "first.usda", tmp_path / "second.usda", model, skeleton="/B/Rig")

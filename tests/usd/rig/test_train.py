@@ -59,7 +59,7 @@ def test_numbers_that_no_training_can_use_are_refused(tmp_path, given, said):
 @pytest.mark.parametrize("early", [True, False])
 @pytest.mark.parametrize("kind", ["static", "dynamic"])
 def test_who_stops_while_the_report_is_measured_keeps_the_model(tmp_path, monkeypatch, kind, early):
-    """It takes minutes, and what it measures is learned by then. A button that cancels leaves nothing."""
+    """The report takes minutes, and what it measures is learned by then. A button that cancels leaves nothing."""
     pytest.importorskip("torch")
 
     def stop(*_):

@@ -37,7 +37,7 @@ def _named(*joints):
     ],
 )
 def test_hair_that_hangs_beside_the_head_is_told(edited, tmp_path, above, lock, told):
-    """Hair on the head makes a bake go well, of which the rest is no part."""
+    """With hair on the head, a bake succeeds although it leaves out the rest."""
     head = "hips/neck/head"
     shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{above}/{lock}", f"{head}/hair_0/end"))
     hair = read_rigged_hair(shot)
@@ -60,7 +60,7 @@ def test_a_joint_beside_the_head_that_moves_nothing_is_not_told(edited):
     ],
 )
 def test_chains_of_other_names_beside_those_found_are_told(edited, name, told):
-    """In a mesh that the body drives, too, only names tell hair; joints in rows of three may be some."""
+    """In a mesh that the body also drives, only names show which joints are hair; joints in rows of three may be."""
     head = "hips/head"
 
     def change(stage):
@@ -83,12 +83,12 @@ def test_chains_of_other_names_beside_those_found_are_told(edited, name, told):
     ("name", "drives", "told"),
     [
         ("cable", [0, 2, 3, 4, 2, 3, 4, 0, 0], "the body drives that mesh, too; if it is hair"),
-        ("cable", [2, 2, 2, 1, 1, 1, 1, 1, 1], None),  # of a mesh of its own it is found
+        ("cable", [2, 2, 2, 1, 1, 1, 1, 1, 1], None),  # with its own mesh it is found
         ("ear", [0, 2, 3, 4, 2, 3, 4, 0, 0], None),
     ],
 )
 def test_chains_of_other_names_are_told_where_none_is_found(edited, name, drives, told):
-    """With the names to choose them by, and as far as they are like hair where the stage has some of another kind."""
+    """With names for choosing them, and if the stage has hair of another kind, only if they are like hair."""
     head = "hips/head"
     tail = [f"{head}/{name}_0", f"{head}/{name}_0/{name}_1", f"{head}/{name}_0/{name}_1/{name}_2"]
 

@@ -11,7 +11,7 @@ from ..shots import Recipe, write_shot
 
 
 def _twins(folder, places: dict[str, float], grooms):
-    """A shot of characters at these places along X [m], and apart from them a groom of each name."""
+    """A shot of characters at these places along X [m], and outside of them a groom of each name."""
     asset = Usd.Stage.Open(str(write_shot(folder, Recipe(bound="mesh"), "asset")))
     hair = Sdf.Layer.CreateAnonymous()
     Sdf.CreatePrimInLayer(hair, "/Hair")

@@ -64,7 +64,7 @@ def test_hair_on_a_joint_below_the_head_goes_with_it_and_is_still_the_heads(tmp_
     ("unit", "followed", "joint"), [(1, HEAD, "head"), (0.01, HEAD, "head"), (1, len(JOINTS), "jaw"), (1, 2, "head")]
 )
 def test_hair_goes_with_the_joint_that_its_own_transform_follows(tmp_path, model, unit, followed, joint):
-    """As tools write the child of a bone, whatever skin is under its roots; not with a neck, which carries a head."""
+    """As tools write the child of a bone, whatever skin is under its roots; but not with a neck, which carries a head."""
     path = write_shot(tmp_path, Recipe(bound="mesh", unit=unit))
     stage = _with_a_jaw(path) if unit == 1 else Usd.Stage.Open(str(path))
     stage.Save()
@@ -111,7 +111,7 @@ def test_each_groom_finds_its_own_character(tmp_path):
 @pytest.mark.parametrize("bound", ["own", "mesh", "none"])
 @pytest.mark.parametrize("places", [(2.0, 0.0), (0.0, 0.0)])
 def test_hair_at_the_origin_is_not_another_characters(tmp_path, bound, places):
-    """Hair lies there as any character's does in its bind pose."""
+    """Any character's hair may lie there in its bind pose."""
     write_shot(tmp_path, Recipe(bound=bound), "asset")
     stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
     UsdGeom.SetStageMetersPerUnit(stage, 1)
@@ -150,7 +150,7 @@ def test_hair_bound_by_vertex_is_carried_by_what_carries_its_roots(tmp_path):
 
 
 def test_hair_moved_by_its_own_parents_lies_where_it_began(tmp_path):
-    """As exported by tools that bake a head constraint into the groom's transform."""
+    """As exported by tools that bake a head constraint to the groom's transform."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     rig = read_shot(path).rigs[0]
     stage = Usd.Stage.Open(str(path))
@@ -197,7 +197,7 @@ def test_blend_shapes_of_a_groom_are_told(tmp_path):
 
 @pytest.mark.parametrize(("scale", "words"), [((0, 0, 0), "zero scale"), ((-1, 1, 1), "mirrored")])
 def test_a_joint_without_a_turn_is_named(tmp_path, scale, words):
-    """By a bake, and by `inspect`, which is asked before."""
+    """By a bake, and by `inspect` before it."""
     path = write_shot(tmp_path, Recipe())
     stage = Usd.Stage.Open(str(path))
     animation = UsdSkel.Animation(next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation)))

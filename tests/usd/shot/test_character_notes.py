@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of a character that lies in its bind pose, has no body or an unusual one, and of a stage that says neither axis
+"""Notes on a character that lies down in its bind pose, or has no body or an unusual one, and on a stage that states neither axis
 nor unit.
 """
 
@@ -18,7 +18,7 @@ ELBOWS = {"left_lower_arm": "arm_twist_L", "right_lower_arm": "arm_twist_R"}
 
 
 def _said(path, words) -> list[str]:
-    """The notes with these words, alike for a bake and for `inspect`."""
+    """The notes with these words, the same for a bake and for `inspect`."""
     noted, told = (
         [note for note in notes if words in note] for notes in (read_shot(path).notes, inspect(path)["spoils"])
     )
@@ -90,7 +90,7 @@ def test_a_character_without_a_body_is_told(tmp_path, bound):
 
 @pytest.mark.parametrize("up, unit", [("Y", 1.0), ("Z", 0.01)])
 def test_a_body_that_is_a_point_cache_is_told_and_nothing_beside_it(tmp_path, up, unit):
-    """As it is exported beside the skeleton that moved it."""
+    """As exported beside the skeleton that moved it."""
     path = write_shot(tmp_path, Recipe(up=up, unit=unit))
     stage = Usd.Stage.Open(str(path))
     skin = stage.GetPrimAtPath("/Hero/Skin")
@@ -137,7 +137,9 @@ def test_a_head_larger_than_a_network_has_seen_is_told(tmp_path, size, told):
 
 @pytest.mark.parametrize("wider", [1.0, 2.5])
 def test_fur_beside_the_hair_says_nothing_false_of_the_head(tmp_path, wider):
-    """Whose size and neck are looked for at the joint that carries the fur: a chest may be too large for a head, or no head's."""
+    """Head size and neck are not judged at the joint that carries the fur: a chest may be too large for a head, or not a head's at
+    all.
+    """
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     hair = read_shot(path).notes
     stage = Usd.Stage.Open(str(path))
@@ -179,7 +181,7 @@ def test_a_joint_of_two_meanings_is_told(tmp_path):
 
 @pytest.mark.parametrize("uneven", [None, "character", "head", "arm_L"])
 def test_hair_that_is_scaled_unevenly_is_told(tmp_path, uneven):
-    """For its strands then change their lengths in the world; an even scale is as it should be."""
+    """Because its strands then change their lengths in the world; an even scale is fine."""
     scale = np.diag([1.05, 0.95, 1.05, 1] if uneven == "character" else [0.6, 0.6, 0.6, 1])
     path = write_shot(tmp_path, Recipe(place=scale))
     if uneven in ("head", "arm_L"):

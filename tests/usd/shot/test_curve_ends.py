@@ -27,7 +27,7 @@ def _curves(stage, points, counts, basis="catmullRom", wrap="nonperiodic"):
 
 
 def _shot(folder, basis, before, after, name):
-    """A shot whose strands have these further points (S, n, 3) at their ends."""
+    """A shot whose strands have these additional points (S, n, 3) at their ends."""
     recipe = Recipe(strands=STRANDS, vertices=VERTICES, basis=basis, bound="mesh")
     path = write_shot(folder, recipe, name)
     stage = Usd.Stage.Open(str(path))
@@ -74,7 +74,7 @@ def test_hair_moves_as_without_the_points_beyond_its_ends(tmp_path, model, basis
         moved = world_points(result.path, code).reshape(STRANDS, -1, 3)
         expected = world_points(plain.path, code).reshape(STRANDS, -1, 3)
         np.testing.assert_allclose(moved[:, 1:-1], expected, atol=1e-6)
-        # They go on from the ends as they did, so the curve keeps its direction there.
+        # They continue from the ends as before, so the curve keeps its direction there.
         np.testing.assert_allclose(moved[:, 0], 2 * moved[:, 1] - moved[:, 2], atol=1e-5)
         np.testing.assert_allclose(moved[:, -1], 2 * moved[:, -2] - moved[:, -3], atol=1e-5)
         item = baked.shot.grooms[0]
@@ -84,7 +84,7 @@ def test_hair_moves_as_without_the_points_beyond_its_ends(tmp_path, model, basis
 
 
 def test_points_beyond_the_ends_keep_their_place_against_them(tmp_path, model, still_model):
-    """At any place: in a still pose with the author's own bits, in another with the distances to the end's edge."""
+    """At any place: in a still pose with the author's exact bits, in another with the distances to the end's edge."""
     hair, random = strand_points(STRANDS, VERTICES), np.random.default_rng(0)
     before, after = (hair[:, [end]] + random.normal(0, 0.01, (STRANDS, 1, 3)) for end in (0, -1))
     shot = _shot(tmp_path, "catmullRom", before, after, "askew")
@@ -122,7 +122,7 @@ def test_repeated_ends_are_hair_to_their_last_point(tmp_path, model):
 
 @pytest.mark.parametrize("basis", ["catmullRom", "bspline"])
 def test_first_points_that_lie_on_the_skin_are_roots(tmp_path, model, basis):
-    """Many leave the wrap of their curves as it is, and mean hair from its first point to its last: it moves as if pinned."""
+    """Many files leave the curves' wrap at its default, but mean hair from its first point to its last: it moves as if pinned."""
     paths = []
     for wrap in ("pinned", "nonperiodic"):
         path = write_shot(tmp_path, Recipe(strands=STRANDS, vertices=VERTICES, basis=basis, bound="mesh"), wrap)
@@ -159,7 +159,7 @@ def test_strands_that_usd_counts_no_whole_segments_in_are_told(basis, wrap):
      ([2, 3, 5, 6], "nonperiodic", "4 of 4 strands have 2, 3, 5, ... points,")],
 )  # fmt: skip
 def test_which_strands_lack_points_is_told(counts, wrap, told):
-    """Neither lone points, which are told otherwise, nor closed curves."""
+    """Not lone points, which have another note, nor closed curves."""
     stage = Usd.Stage.CreateInMemory()
     notes = undrawn(_curves(stage, np.zeros((sum(counts), 3)), counts, "bezier", wrap))
     assert told in notes[0] if told else notes == []

@@ -59,7 +59,7 @@ def test_varying_widths_of_cubic_curves_are_those_of_segments_ends(name):
         curves.CreateBasisAttr(basis)
         curves.CreateWrapAttr(wrap)
         size = curves.ComputeVaryingDataSize(Usd.TimeCode.Default())
-        # Of thickness that shrinks evenly along each strand, every point has what lies at its place.
+        # With thickness that shrinks evenly along each strand, every point gets the value at its place.
         ends = {5: [0, 1, 0, 0.5, 1], 7: [0, 1, 0, 0.25, 0.5, 0.75, 1]}[size]
         attribute = curves.GetPrim().CreateAttribute(name, Sdf.ValueTypeNames.FloatArray)
         attribute.Set((0.001 - 0.0009 * np.array(ends)).tolist())
@@ -88,7 +88,7 @@ def test_caches_may_repeat_their_counts_but_not_change_them():
 
 @pytest.mark.parametrize("cache", [False, True])
 def test_hair_that_was_exported_live_moves_once(tmp_path, model, cache):
-    """The points at rest that Blender's live view kept count, not those that it showed, one set or many."""
+    """The rest points that Blender's live view stored count, not those that it showed, one set or many."""
     recipe = Recipe(bound="none", strands=5, vertices=4)
     plain, live = write_shot(tmp_path, recipe, "plain"), write_shot(tmp_path, recipe, "live")
     stage = Usd.Stage.Open(str(live))
@@ -136,7 +136,7 @@ def test_a_rest_shape_that_was_kept_counts_where_it_is_whole(kept, counts):
 
 
 def test_what_groom_readers_know_is_written_and_goes_on(tmp_path):
-    """Root UVs and widths also where a file has none; colours, numbers and guides of other tools as they were."""
+    """Root UVs and widths even if a file has none; colours, numbers and guides of other tools unchanged."""
     source = write_shot(tmp_path, Recipe(bound="none", strands=5, vertices=4), "source")
     stage = Usd.Stage.Open(str(source))
     prim = stage.GetPrimAtPath("/Hero/Hair")
@@ -172,7 +172,7 @@ def test_what_groom_readers_know_is_written_and_goes_on(tmp_path):
     [("bezier", 3, True), ("catmullRom", 5, True), ("catmullRom", 7, True), ("bspline", 4, False)],
 )
 def test_varying_values_go_on_with_their_spline(tmp_path, basis, each, fits):
-    """One for each end of a segment; of pinned curves, also as many as points."""
+    """One for each end of a segment; for pinned curves, also as many as points."""
     source = write_shot(tmp_path, Recipe(bound="none", strands=4, vertices=7, basis=basis), "source")
     stage = Usd.Stage.Open(str(source))
     values = [0.5 * i for i in range(4 * each)]

@@ -82,7 +82,7 @@ def test_the_roots_of_strands_from_tip_to_root_tell_the_head(tmp_path, bound):
 
 
 def test_a_hat_takes_no_hair_from_the_head_under_it(tmp_path):
-    """Its skeleton has no joint named like a head, and hair sits on its mesh as well as on the skin."""
+    """The hat's skeleton has no joint named like a head, and hair sits on its mesh as well as on the skin."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     layer = stage.GetRootLayer()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bake over another groom or animation than it was made from is told, and no other."""
+"""A bake over another groom or animation than it was made from gets a note, and no other bake does."""
 
 import pytest
 from pxr import Gf, Sdf, Usd
@@ -121,7 +121,7 @@ def test_a_bake_that_is_played_slower_is_told_so_and_another_frame_rate_is_not(t
 
 
 def test_a_bake_under_another_groom_is_told(tmp_path, model):
-    """Of fewer strands in a layer below; and of points over it, which hide its samples."""
+    """A groom with fewer strands in a layer below; and points in a layer above, which hide its samples."""
     shot = write_shot(tmp_path)
     bake(shot, tmp_path / "hair.usdc", model)
     stage = Usd.Stage.Open(str(shot))

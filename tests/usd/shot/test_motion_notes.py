@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of motion capture by `inspect`, and by what trains with it."""
+"""What `inspect`, and training, say about motion capture."""
 
 import numpy as np
 import pytest

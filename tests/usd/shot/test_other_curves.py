@@ -35,7 +35,7 @@ def told(stage, name):
 
 @pytest.mark.parametrize("kind", [UsdGeom.NurbsCurves, UsdGeom.HermiteCurves])
 def test_hair_of_other_kinds_is_told(shot, kind):
-    """On the skin, each guide a prim of its own, and some way off it."""
+    """On the skin, with each guide in its own prim, and some way off the skin."""
     strands = strand_points(40, 12)
     curves(shot, kind, "/Hero/Locks", strands)
     (line,) = told(shot, "/Hero/Locks")
@@ -57,7 +57,7 @@ def test_what_a_scale_of_zero_hides_stops_no_bake(shot, later):
 
 
 def test_what_is_no_hair_is_not(shot):
-    """Cables of a set, a ring to pull at, and a line from the head to what it looks at."""
+    """Cables of a set, a control ring, and a line from the head to what it looks at."""
     cables = np.random.default_rng(0).uniform(4, 9, (9, 5, 3))
     turn = np.linspace(0, 2 * np.pi, 11)
     ring = CENTRE + 0.11 * np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)

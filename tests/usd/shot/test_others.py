@@ -48,7 +48,7 @@ def test_what_is_bound_elsewhere_is_left_out_unread(tmp_path, read):
 
 @pytest.mark.parametrize("bound", ["mesh", "none"])
 def test_what_lies_far_from_a_named_skeleton_is_left_out_without_its_own(tmp_path, read, bound):
-    """Hair near to it may be that of another: these are read once, as they are for all of the hair there."""
+    """Hair near to it may belong to others: they are read once, for all of the hair there."""
     path = _crowd(tmp_path, bound)
     whole = {item.path: item for item in read_shot(path).grooms}
     read.clear()

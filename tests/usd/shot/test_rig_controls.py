@@ -26,7 +26,7 @@ def curve(stage, path, points, *, closed=False, guide=True):
 
 @pytest.fixture
 def shot(tmp_path):
-    """Hair, three circles to pull at, one hanging free, and a straight line from a hand to its pole."""
+    """Hair, three control circles, one of them hanging free, and a straight line from a hand to its pole."""
     stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"))))
     for name, centre in CIRCLES.items():
         ring = 0.1 * np.stack([np.cos(RING), 0 * RING, np.sin(RING)], axis=1) + centre
@@ -58,7 +58,7 @@ def test_where_nothing_else_is_there_they_are_the_error(shot):
 
 
 def test_guides_of_a_groom_stay_hair(shot):
-    """One on skin with a prim of its own, and several that hover over it."""
+    """One on skin in its own prim, and several that hover over skin."""
     root = CENTRE + [0, RADIUS, 0]
     curve(shot, "/Hero/Guide", root + np.linspace(0, 0.1, 8)[:, None] * [0, 1, 0])
     curve(shot, "/Hero/Guides", root + [0, 0.05, 0] + np.linspace(0, 0.1, 8)[:, None] * [0, 1, 0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where curves that nothing binds lie in the bind pose, in scenes of which the bind pose is no frame."""
+"""Where curves without a binding are in the bind pose, in scenes where no frame shows the bind pose."""
 
 import numpy as np
 import pytest
@@ -18,11 +18,11 @@ from usd.skel import skin, surface
 from ..shots import CENTRE, HEAD, Recipe, world_points, write_shot
 
 START = 4
-"""Time code at which a character that turns its head from the first frame on is seen first."""
+"""Time code at which a character that turns its head from the first frame on is first seen."""
 
 
 def _turned(tmp_path, bound, nesting="/Hero") -> tuple[Usd.Stage, np.ndarray]:
-    """A shot in which the head is turned when the motion begins, and where it is at each frame against its bind pose."""
+    """A shot in which the head is turned when the motion begins, and where it is at each frame relative to its bind pose."""
     path = write_shot(tmp_path, Recipe(bound=bound, nesting=nesting))
     stage = Usd.Stage.Open(str(path))
     motion = UsdSkel.Animation(stage.GetPrimAtPath(f"{nesting}/Rig/Motion"))
@@ -52,7 +52,7 @@ def test_a_moving_cache_is_where_it_is_seen(tmp_path, still_model, bound):
     shot = read_shot(stage.GetRootLayer().realPath)
     np.testing.assert_allclose(shot.grooms[0].groom.points, rest, atol=1e-6)
     assert any("no points at the default time; those at time code 4" in note for note in shot.notes)
-    # Whoever reads the bake finds the same shape at rest, and the hair where it was seen.
+    # The bake, read back, has the same rest shape, and the hair is where it was seen.
     baked = read_baked(bake(shot, tmp_path / "hair.usdc", still_model).path)
     (item,) = baked.shot.grooms
     np.testing.assert_allclose(item.groom.points, rest, atol=1e-6)
@@ -87,7 +87,7 @@ def test_hair_of_an_animated_set_in_which_the_character_walks_is_not_taken_from_
     stage, _ = _turned(tmp_path, "mesh", "/Train/Hero")
     layer = stage.GetRootLayer()
     points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Train/Hero/Hair")).GetPointsAttr()
-    # Where it hovers over skin, one place is hardly nearer to that than another.
+    # If it hovers over skin, one place is hardly nearer to the skin than another.
     rest = np.asarray(points.Get()) + [0, 0.015, 0]
     points.Set(_rigid(rest, np.eye(4)))
     Sdf.CopySpec(layer, "/Train/Hero/Hair", layer, "/Train/Hair")
@@ -107,7 +107,7 @@ def test_hair_of_an_animated_set_in_which_the_character_walks_is_not_taken_from_
 
 @pytest.mark.parametrize("away", [0.0, 1e4])
 def test_hair_that_rises_with_the_head_is_taken_from_there_far_from_the_origin_too(tmp_path, away):
-    """A step aside is little beside ten kilometres, and still a step aside."""
+    """A step aside is small compared with ten kilometres, but still a step aside."""
     place = np.eye(4)
     place[0, 3] = away
     stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="none", place=place))))
@@ -163,7 +163,7 @@ def test_hair_made_where_the_character_stands_first_and_hair_off_the_skin(tmp_pa
 
 @pytest.mark.parametrize("bound", ["mesh", "none"])
 def test_hair_made_at_the_shots_first_frame_after_a_run_up(tmp_path, bound):
-    """And if it was made for a frame between, that is said, though its user named it."""
+    """If it was made for a frame in between, a note says so, although its user named it."""
     path = write_shot(tmp_path, Recipe(bound=bound))
     stage = Usd.Stage.Open(str(path))
     motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion")).GetTranslationsAttr()
@@ -190,7 +190,7 @@ def test_hair_made_at_the_shots_first_frame_after_a_run_up(tmp_path, bound):
 
 @pytest.mark.parametrize("lifted", [0.0, 0.4], ids=["some_roots_far", "most_roots_far"])
 def test_a_seat_within_a_bound_is_the_seat(tmp_path, lifted):
-    """A crowd is searched with a bound: what lies beyond it is not measured, and must not change what is found."""
+    """A crowd is searched with a bound: what is beyond it is not measured, and must not change the result."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
@@ -207,7 +207,7 @@ def test_a_seat_within_a_bound_is_the_seat(tmp_path, lifted):
 
 
 def test_hair_sits_in_the_middle_of_wide_faces(tmp_path):
-    """A large head or one of few vertices: hair far from every corner was taken to lie off the skin, and placed without it."""
+    """A large head, or one with few vertices: hair far from every corner must not count as off the skin, and be placed without it."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     mesh, curves = (UsdGeom.PointBased(stage.GetPrimAtPath(f"/Hero/{name}")) for name in ("Skin", "Hair"))
@@ -216,7 +216,7 @@ def test_hair_sits_in_the_middle_of_wide_faces(tmp_path):
     sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr().Set([4] * 6)
     UsdGeom.Mesh(mesh).GetFaceVertexIndicesAttr().Set(np.ravel(sides).tolist())
-    # The lower corners hang on another joint: what hair rides on is asked of those near to it.
+    # The lower corners follow another joint: what hair rides on is decided by the corners near to it.
     binding = UsdSkel.BindingAPI(mesh)
     binding.GetJointIndicesPrimvar().Set([1, 1, HEAD, HEAD] * 2)
     binding.GetJointWeightsPrimvar().Set([1.0] * 8)
@@ -235,7 +235,7 @@ def test_hair_sits_in_the_middle_of_wide_faces(tmp_path):
 
 
 def test_a_crowds_skins_are_found_and_sorted_once_each(tmp_path, monkeypatch):
-    """Not once for each character or groom: reading 24 of 13,000 points took half a minute."""
+    """Not once for each character or groom: reading 24 of 13,000 points would take half a minute."""
     write_shot(tmp_path, Recipe(bound="mesh"), "asset")
     stage = Usd.Stage.CreateNew(str(tmp_path / "crowd.usda"))
     UsdGeom.SetStageMetersPerUnit(stage, 1)
@@ -253,7 +253,7 @@ def test_a_crowds_skins_are_found_and_sorted_once_each(tmp_path, monkeypatch):
 
 
 def test_a_moving_prims_motion_is_measured_alike_often_for_few_and_many_meshes(tmp_path, monkeypatch):
-    """Per mesh, a crowd that walks by its transforms takes seven times as long to read."""
+    """Measured per mesh, a crowd that walks by its transforms would take seven times as long to read."""
     stage, head = _turned(tmp_path, "mesh")
     op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddTransformOp()
     for code in range(START, 10):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strands that run from tip to root are told, and no others."""
+"""Strands that run from tip to root get a note, and no others."""
 
 import numpy as np
 import pytest
@@ -85,7 +85,9 @@ def test_skin_without_faces_tells_nothing_of_short_strands(tmp_path):
 
 
 def test_bound_hair_far_from_the_skin_is_told(tmp_path):
-    """A wrong unit or bind transform: the joint is right, so nothing else shows that it moves about a point beside the body."""
+    """For a wrong unit or bind transform, the joint is right, so nothing else shows that the hair moves about a point beside the
+    body.
+    """
     path = write_shot(tmp_path, Recipe(bound="own"))
     assert not any("geomBindTransform" in note for note in read_shot(path).notes)
     stage = Usd.Stage.Open(str(path))

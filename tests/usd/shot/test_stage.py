@@ -78,7 +78,7 @@ def test_rigs_are_read_without_grooms_or_animation(tmp_path):
 
 
 def test_why_an_animation_does_not_count_is_what_is_wrong_with_it(tmp_path):
-    """And not with a mesh, of which something is said later."""
+    """And not an error of a mesh, which has its own message later."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     stage.GetPrimAtPath("/Hero/Rig/Motion").GetAttribute("scales").Clear()
@@ -96,7 +96,7 @@ def test_why_an_animation_does_not_count_is_what_is_wrong_with_it(tmp_path):
 
 @pytest.mark.parametrize("bound", ["own", "mesh"])
 def test_values_at_a_single_time_are_values_at_rest(tmp_path, bound):
-    """Exporters of single frames write all that may vary as one sample, transforms and weights too."""
+    """Exporters of single frames write everything that may vary as one sample, including transforms and weights."""
     place = np.eye(4)
     place[:3, 3] = 3, 0, 1
     path = write_shot(tmp_path, Recipe(bound=bound, place=place, unit=0.01))
@@ -221,12 +221,12 @@ def test_the_rest_of_a_character_on_a_skeleton_of_its_own_is_told(tmp_path):
     assert any(note.startswith(told) for note in read_shot(path).notes)
     assert any(note.startswith(told) for note in inspect(path)["spoils"])
     UsdGeom.Xformable(stage.GetPrimAtPath("/Coat")).AddTranslateOp().Set((1, 0, 0))
-    layer.Save()  # now it is somebody else
+    layer.Save()  # now it is another character
     assert not any("same character" in note for note in read_shot(path).notes)
 
 
 def test_why_a_skeleton_is_left_out_is_told_whoever_comes_first(tmp_path):
-    """Also where the first character of the stage carries no hair, so that nothing else is told of it."""
+    """Also if the first character of the stage carries no hair, so that no other message mentions it."""
     path = write_shot(tmp_path, Recipe(nesting="/Dog"))
     layer = Sdf.Layer.FindOrOpen(str(path))
     for name in ("Hero", "Villain"):

@@ -12,17 +12,17 @@ from usd.shot.stage import read_shot
 from ..shots import JOINTS, Recipe, write_shot
 
 APART = 0.45
-"""How far the two stand from each other [m]: nearer than hair may be to a head without skin."""
+"""Distance between the two characters [m]: less than hair may have to a head without skin."""
 
 
 def _mirrored(layer: Sdf.Layer) -> None:
-    """The root, as a copy of the other side is made."""
+    """Mirror the root, as when a copy of the other side is made."""
     stage = Usd.Stage.Open(layer)
     UsdGeom.Xformable(stage.GetPrimAtPath("/bob")).AddScaleOp().Set((-1, 1, 1))
 
 
 def _hidden(layer: Sdf.Layer) -> None:
-    """A character that waits for its entrance at a scale of zero, and its hair with it."""
+    """Hide a character that waits for its entrance at zero scale, and its hair with it."""
     stage = Usd.Stage.Open(layer)
     UsdGeom.Xformable(stage.GetPrimAtPath("/bob")).AddScaleOp().Set((0, 0, 0))
 
@@ -93,7 +93,7 @@ def test_skin_tells_whose_hair_it_is_wherever_the_hair_is_kept(tmp_path, at_hand
 
 
 def test_of_two_who_are_bound_at_one_place_the_hair_of_each_is_its_own(tmp_path):
-    """Rigs are bound where they were made; only their animation puts them apart."""
+    """Rigs are bound where they were made; only their animation separates them."""
     layer = _two(tmp_path, _not_finite)
     del layer.GetPrimAtPath("/bob").properties["xformOp:transform"]
     layer.GetAttributeAtPath("/bob.xformOpOrder").default = Vt.TokenArray()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is axes and what is pose of the transform of a skeleton's parents."""
+"""Which part of a skeleton's parent transform is axes, and which is pose."""
 
 from types import SimpleNamespace
 
@@ -49,7 +49,7 @@ def test_a_lean_of_the_parents_is_pose(axis, lean):
 
 
 def test_quarter_turns_are_axes():
-    """What is built along Z stands by its parents' quarter turn, and leans by what comes on top of it."""
+    """A rig built along Z stands by its parents' quarter turn, and leans by any further rotation."""
     for lean in (0, 25, 60):
         here = bind_world(STANDING, turned("z", lean) @ turned("x", -90), built=turned("x", 90))
         assert np.abs(here - list(STANDING.values())).max() < 1e-9

@@ -12,7 +12,7 @@ WEIGHTS = (-0.3, 0.0, 0.2, 0.5, 0.7, 1.0, 1.4, 0.3, 0.9)
 
 
 def _shaped(path):
-    """The shot with a jaw that opens along a curve, keyed through all of it, and a brow without anything between."""
+    """The shot with a jaw that opens along a curve, keyed through all of it, and a brow without inbetweens."""
     stage = Usd.Stage.Open(str(path))
     skin = UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin"))
     rng = np.random.default_rng(0)

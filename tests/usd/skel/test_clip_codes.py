@@ -26,7 +26,7 @@ def test_a_pose_is_held_to_the_end_of_the_shot_where_the_animation_begins_before
 
 @pytest.mark.parametrize("rate", [24.0, 60.0, 1000.0])
 def test_a_range_that_begins_a_frame_before_the_samples_is_no_stand(tmp_path, rate):
-    """The character begins with the speed that it has; held for 0.1 s it stands."""
+    """The character begins at its own speed; only held for 0.1 s does it stand."""
     path = write_shot(tmp_path, Recipe(rate=rate, frames=9))
     stage = Usd.Stage.Open(str(path))
     stage.SetFramesPerSecond(24)  # the last one counts milliseconds
@@ -45,8 +45,8 @@ def test_a_range_that_begins_a_frame_before_the_samples_is_no_stand(tmp_path, ra
 
 
 def test_keys_of_what_stands_still_are_no_motion(tmp_path):
-    """A parent or scales with the same value at all their keys, of which some lie before the motion and between its samples:
-    the character would stand, and start with a blow. Later ones hold it, as without them.
+    """A parent or scales with the same value at all their keys, some before the motion and between its samples: otherwise the
+    character would stand, and start with a blow. Later keys hold it, as without them.
     """
     path = write_shot(tmp_path, Recipe(frames=9))
 
@@ -75,7 +75,7 @@ def test_keys_of_what_stands_still_are_no_motion(tmp_path):
 
 
 def stepped(folder, samples, step=13.0, end=40):
-    """A shot in which the head turns about +Y within no time at `step`, sampled at these time codes."""
+    """A shot in which the head turns about +Y in no time at `step`, sampled at these time codes."""
     path = write_shot(folder, Recipe(frames=40), name=f"{len(samples)}")
     stage = Usd.Stage.Open(str(path))
     stage.SetEndTimeCode(end)
@@ -99,7 +99,7 @@ def stepped(folder, samples, step=13.0, end=40):
 @pytest.mark.parametrize("step", [13.0, 13.004, 12.8])
 @pytest.mark.parametrize("apart", [0.2, 0.01, 0.001])
 def test_a_pair_of_samples_that_makes_a_step_is_felt_as_a_sample_a_frame_is(tmp_path, step, apart):
-    """As keys that hold are written. A spline through both would fling hair before the step, too."""
+    """As held keys are written. A spline through both would also fling hair before the step."""
     held = stepped(tmp_path, [1, step - apart, step, 40], step)
     dense = stepped(tmp_path, range(1, 41), 13.0)
     sampler = {
@@ -135,7 +135,7 @@ def test_pairs_of_samples_that_are_near_the_next_ones_are_no_steps(tmp_path):
 
 
 def test_more_samples_than_can_be_held_are_read_once_a_frame(tmp_path, monkeypatch):
-    """A take with motion blur, of which frames alone can be held; a span of too many frames is refused as ever."""
+    """A take with motion blur, of which only whole frames fit in memory; a span of too many frames is refused as before."""
     path = write_shot(tmp_path, Recipe(frames=9))
     stage = Usd.Stage.Open(str(path))
     animation = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation))

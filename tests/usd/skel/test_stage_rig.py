@@ -22,7 +22,7 @@ def test_a_rate_of_its_own_gives_seconds_of_its_own(tmp_path):
 
 
 def test_motion_does_not_depend_on_the_rate_of_the_stage_that_it_comes_to(tmp_path):
-    """A layer of 24 frames a second in a shot of 60, its first frame between two of the shot's."""
+    """A layer with 24 frames per second in a shot with 60, its first frame between two of the shot's."""
     motion = write_shot(tmp_path, Recipe(frames=9), "motion")
     stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
     UsdGeom.SetStageMetersPerUnit(stage, 1)
@@ -32,7 +32,7 @@ def test_motion_does_not_depend_on_the_rate_of_the_stage_that_it_comes_to(tmp_pa
     stage.GetRootLayer().Save()
     own, seen = (read_rigs(path)[0].clip for path in (motion, tmp_path / "shot.usda"))
     assert np.allclose(seen.times - seen.start, own.times - own.start)
-    # Far keys are joined by straight lines, as renderers do.
+    # Distant keys are joined by straight lines, as in renderers.
     for attribute in stage.GetPrimAtPath("/Hero/Rig/Motion").GetAttributes():
         stage.SetEditTarget(stage.GetRootLayer())
         values = {code: attribute.Get(code) for code in attribute.GetTimeSamples()[::4]}
@@ -74,7 +74,7 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
     assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note  # all joints are, with it
     assert not replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes(replaced=[0])  # which carries all others
-    turned[:, -1, :3, :3] = 0  # a joint that hides what hangs from it
+    turned[:, -1, :3, :3] = 0  # a joint that hides its children
     (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
     assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note
 

@@ -25,7 +25,7 @@ def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path, still_mo
     above.CreateJointsAttr([JOINTS[HEAD]])
     above.CreateJointIndicesPrimvar(True, 1).Set(Vt.IntArray([0]))
     above.CreateJointWeightsPrimvar(True, 1).Set(Vt.FloatArray([1.0]))
-    # An attribute on a prim without a binding is none.
+    # An attribute on a prim without a binding does not count.
     beside = UsdGeom.Xform.Define(stage, "/Hero/Groom/Left").GetPrim()
     beside.CreateAttribute("primvars:skel:geomBindTransform", above.GetGeomBindTransformAttr().GetTypeName()).Set(
         Gf.Matrix4d(2)
@@ -44,7 +44,7 @@ def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path, still_mo
     assert item.joint == JOINTS[HEAD] == skinning.GetJointOrder()[0]
     expected = [skinning.GetGeomBindTransform().Transform(Gf.Vec3d(*map(float, p))) for p in rest_points(item.prim)]
     np.testing.assert_allclose(item.groom.points, expected, atol=1e-6)
-    # What unbinds the hair leaves the group's binding, of which whoever reads the bake must know.
+    # Unbinding the hair leaves the group's binding, which readers of the bake must handle.
     (again,) = read_shot(bake(path, tmp_path / "hair.usdc", still_model, frames="1:2").path).grooms
     assert (again.joint, again.attachment.skinned) == (item.joint, True)
     np.testing.assert_array_equal(again.groom.points, item.groom.points)
@@ -55,7 +55,7 @@ def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path, still_mo
 
 @pytest.mark.parametrize("way", ["flattened", "referenced", "rebaked"])
 def test_a_bake_that_is_flattened_or_referenced_still_tells_the_binding_of_its_hair(tmp_path, still_model, way):
-    """That leads to the bind pose another way than the place in the stage."""
+    """The binding leads to the bind pose by another transform than the place in the stage."""
     path = write_shot(tmp_path)
     stage = Usd.Stage.Open(str(path))
     place = Gf.Matrix4d().SetRotate(Gf.Rotation((1, 2, 3), 40)) * Gf.Matrix4d().SetTranslate((3, 1, 2))
@@ -88,7 +88,7 @@ def test_a_character_that_comes_into_sight_has_its_body_before(tmp_path):
     switch.Set("inherited", 5)
     stage.Save()
     assert read_rigs(path)[0].character.body is not None
-    # Never in sight at one time: while the mesh is shown, what it lies below is hidden.
+    # Never visible: while the mesh is shown, its parent is hidden.
     mesh = UsdGeom.Imageable(stage.GetPrimAtPath("/Hero/Skin")).CreateVisibilityAttr()
     mesh.Set("inherited", 1)
     mesh.Set("invisible", 5)
@@ -119,7 +119,7 @@ def test_a_body_that_usd_leaves_where_it_was_made_is_told(tmp_path):
         layer.Save()
         (note,) = told(layer.realPath)
         assert f" is above {named}, " in note and note.endswith(f"; {remedy}")
-    # A reference on a prim with a type of its own, which is stronger than the SkelRoot's.
+    # A reference on a prim with its own type, which is stronger than the SkelRoot's.
     stage = Usd.Stage.CreateNew(str(tmp_path / "set.usda"))
     for name, kind in (("Left", UsdGeom.Xform), ("Right", UsdSkel.Root)):
         kind.Define(stage, f"/Set/{name}").GetPrim().GetReferences().AddReference("./shot.usda", "/Hero")
@@ -186,7 +186,7 @@ def test_hair_below_a_mirror_has_its_own_points_where_it_rests(tmp_path, model):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_an_open_mesh_of_left_handed_faces_faces_outward(tmp_path, still_model, mirrored):
-    """Its form does not tell its sides, as that of a ball does: hair must be pushed out of it, not through."""
+    """Unlike a ball's, its shape does not tell its sides: hair must be pushed out of it, not through."""
     path = write_shot(tmp_path, Recipe(bound="mesh", strands=20))
     stage = Usd.Stage.Open(str(path))
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin"))
@@ -197,7 +197,7 @@ def test_an_open_mesh_of_left_handed_faces_faces_outward(tmp_path, still_model, 
     mesh.GetFaceVertexIndicesAttr().Set(cap.ravel().tolist())
     stage.Save()
     right = read_rigs(path)[0].character.body
-    if mirrored:  # by its binding, which turns faces round once more
+    if mirrored:  # by its binding, which flips faces once more
         place = Gf.Matrix4d().SetScale((-1, 1, 1))
         mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy((points * [-1, 1, 1]).astype(np.float32)))
         UsdSkel.BindingAPI(mesh).GetGeomBindTransformAttr().Set(place)
