@@ -119,7 +119,7 @@ def extension(output: Path, platform: str, wheels: list[Path]) -> Path:
 
 
 def legacy(output: Path, wheels: list[Path]) -> Path:
-    """The zip for Blender before 4.2: a folder with the packages unpacked in it; the first wheel, our own, is also there as a file."""
+    """The zip for Blender before 4.2: a folder with the packages unpacked in it, and the first wheel, our own, as a file."""
     manifest = (HERE / "blender_manifest.toml").read_text(encoding="utf-8")
     out = output / f"neuralocks-{version(manifest)}-legacy-{LEGACY[0]}.zip"
     with Written(out) as archive:

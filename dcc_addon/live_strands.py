@@ -248,7 +248,7 @@ def show_rest_left(things) -> None:
 
 
 def show_all_rest() -> None:
-    """Restore the rest shapes of all curves of the file, also those that live hair has left behind, in no scene or with no object."""
+    """Restore the rest shapes of all curves of the file, also those that live hair left behind, in no scene or with no object."""
     for thing in bpy.data.objects:
         if thing.type == "CURVES":
             joined.settle(thing)

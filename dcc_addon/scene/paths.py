@@ -24,7 +24,7 @@ def absolute(path: str, library=None) -> str:
 
 
 def full(path: str, library=None) -> str:
-    """The same, unchecked. A path written on Windows may separate folders by backslashes after the //, which are letters elsewhere."""
+    """The same, unchecked. A path from Windows may separate folders by backslashes after the //, which are letters elsewhere."""
     if path.startswith("//"):
         path = path.replace("\\", "/")
     return bpy.path.abspath(path, library=library)

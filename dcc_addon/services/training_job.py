@@ -31,7 +31,7 @@ UTF8 = {"encoding": "utf-8", "errors": "replace"}
 
 
 def problem(python: str) -> str:
-    """What keeps this Python from training, with the remedy; empty when it can.
+    """Why this Python cannot train, with the remedy; empty if it can.
 
     Args:
         python: path of an interpreter; empty means none is set.
@@ -148,7 +148,7 @@ class TrainingJob:
         return before + self._left.seconds
 
     def cancel(self) -> None:
-        """Stop it and the processes that it started, and leave nothing behind; the model of a training that has ended well is kept."""
+        """Stop it and the processes that it started, and leave nothing behind; the model of a training that ended well is kept."""
         self._cancelled = True
         for hard in (False, True):
             if self._process.poll() is None:

@@ -70,7 +70,7 @@ def test_stretched_bones_keep_place_and_rotation():
 
 
 def _stretched(rng, apart=()):
-    """World transforms (9, 6, 4, 4) of a chain whose joints turn and scale unevenly at random; those in `apart` inherit no scale."""
+    """World transforms (9, 6, 4, 4) of a chain whose joints turn and scale unevenly at random; those `apart` inherit no scale."""
     turns, world = from_vector(rng.normal(size=(9, 6, 3)) * 0.4), np.zeros((9, 6, 4, 4))
     for joint, parent in enumerate(PARENTS):
         local = np.tile(np.eye(4), (9, 1, 1))

@@ -181,7 +181,7 @@ class _Part:
         return self.layer.GetPrimAtPath(groom).customData[KEY] | options
 
     def check_alike(self, others: list["_Part"]) -> None:
-        """Refuse a part that cannot find its shot, has another shot than the others, or has a groom of theirs with other options."""
+        """Refuse a part that cannot find its shot, has a different shot, or has a groom of other parts with other options."""
         for shot in self._shots():
             if not Ar.GetResolver().Resolve(shot):
                 raise NeuralocksError(

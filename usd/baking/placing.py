@@ -84,7 +84,7 @@ class GroomPlacer:
         return placed.points
 
     def _rest_in_place(self, to_local: np.ndarray) -> np.ndarray | None:
-        """The authored rest points (P, 3) if the groom as a whole stands where it rests."""
+        """The authored rest points (P, 3) if the whole groom is at its rest place."""
         home = inverse(self.item.attachment.to_bind)
         shift = self._corners @ (to_local - home)[:3, :3].T + (to_local - home)[:3, 3]
         scale = abs(sizes(home))

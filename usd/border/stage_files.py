@@ -140,7 +140,7 @@ def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
 
 
 def refresh_open(path: Path) -> None:
-    """Let stages that this process has open, or opens later, see a rewritten file: USD keeps a layer as long as anybody holds it."""
+    """Let stages that this process has open, or opens later, see a rewritten file: USD keeps a layer while anybody holds it."""
     layer = Sdf.Layer.Find(os.path.realpath(path)) or Sdf.Layer.Find(str(path))
     if layer:
         layer.Reload(force=True)

@@ -36,7 +36,7 @@ def as_numbers(attribute: Usd.Attribute, wanted: str, value, dtype=float) -> np.
 
 
 def as_names(attribute: Usd.Attribute, value) -> tuple[str, ...]:
-    """A value of an attribute as names; () where there is none.
+    """A value of an attribute as names; () if there is none.
 
     Raises:
         NeuralocksError: it is of another type.

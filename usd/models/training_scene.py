@@ -64,7 +64,7 @@ def training_scene(
         grooms: USD files with BasisCurves that lie on the character's bind pose, or "library"; the character's own if
             none, without those of others in its file.
         motion: BVH files, or USD files that animate a skeleton; made-up motion is always added.
-        skeleton: prim path of the skeleton wanted, where there are several.
+        skeleton: prim path of the skeleton wanted, if there are several.
         head: joint that is the head, if its name does not tell.
         joints: semantic joint -> joint, if names are not enough.
         seed: for everything random.

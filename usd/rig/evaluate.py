@@ -41,7 +41,7 @@ class RigCard:
         skeleton: its Skeleton prim.
         measures: `joints`, `chains`, `vertices`, `frames`; `swing_mm`: how far vertices are from where they would be carried
             rigidly (root mean square), `swing_most`: the chain that swings most, `swing_most_mm`; `jitter_mm`: the farthest
-            that a vertex goes from one frame to the next once a pose has been held for two seconds, NaN where none is;
+            that a vertex goes from one frame to the next once a pose has been held for two seconds, NaN if none is;
             `body` and `body_rigid`: `metrics.penetration` of the animation and of hair carried rigidly, in `body_frames`
             frames, with `deepest_at` (time code) and `deepest` (chain). Without a body near the hair, these are missing.
         notes: what a user should know.
@@ -158,7 +158,7 @@ class _Posed:
 
 def _moved(posed: _Posed, moving: np.ndarray, say) -> tuple[np.ndarray, float, dict[int, np.ndarray]]:
     """Mean squared distances (V,) [m^2] of vertices from where they would be carried rigidly; the largest step [mm] of any
-    where all other joints have been still for SETTLED, NaN where they never are; and the vertices (2, V, 3) of the rows in
+    where all other joints have been still for SETTLED, NaN if they never are; and the vertices (2, V, 3) of the rows in
     which distances to the body are measured. Other vertices are not kept: a long animation has gigabytes of them.
     """
     clip, total, steps, seen, before = posed.clip, 0.0, [], {}, None

@@ -207,8 +207,7 @@ def _check_authored(prim: Usd.Prim) -> None:
 
 
 def check_orients(source: StageRig, chains: HairChains) -> None:
-    """The core works on orients whose scale and mirroring are taken out; joint rotations can only be written
-    without the latter.
+    """The core works on orients without scale and mirroring; joint rotations can only be written if orients are not mirrored.
 
     Raises:
         NeuralocksError: names the joint.

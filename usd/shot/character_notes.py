@@ -87,7 +87,7 @@ def uneven(transform: np.ndarray, least: float = UNEVEN) -> bool:
 
 
 def _unevenness(transforms: np.ndarray) -> np.ndarray:
-    """The largest scale of transforms (..., 4, 4) over the smallest; 1 where that is zero, which is told elsewhere."""
+    """The largest scale of transforms (..., 4, 4) over the smallest; 1 if that is zero, which is reported elsewhere."""
     sizes = np.linalg.svd(transforms[..., :3, :3], compute_uv=False)
     largest, smallest = sizes[..., 0], sizes[..., 2]
     return np.divide(largest, smallest, out=np.ones_like(largest), where=smallest > 1e-9)

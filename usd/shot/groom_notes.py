@@ -45,12 +45,12 @@ def stands_still(path: str, rig: StageRig) -> str:
 
 
 def another_carries(path: str, rig: StageRig) -> str:
-    """The note on a groom that is carried by another skeleton than the one the user named."""
+    """The note on a groom that is carried by a different skeleton than the one the user named."""
     return f"{path}: is carried by {rig.path}; left out, or name it with --groom"
 
 
 def another_binds(path: str, own: str) -> str:
-    """The note on a groom that is bound to another skeleton than the one the user named."""
+    """The note on a groom that is bound to a different skeleton than the one the user named."""
     return f"{path}: is bound to {own}; left out, or name it with --groom"
 
 

@@ -33,7 +33,7 @@ class HairSearch:
         head: the user's `--head`.
         notes: what a user should know is added here.
         named: the user named these curves: none is left out because it is empty or far away.
-        others: skeletons whose hair is not wanted; None where there are none.
+        others: skeletons whose hair is not wanted; None if there are none.
         forced: the user named the skeleton for these curves: a binding to another does not count.
 
     Attributes:

@@ -93,7 +93,7 @@ def left_out(error) -> str:
 
 
 def first_of(rigs: Sequence[StageRig]) -> list[str]:
-    """The note on a file with several skeletons of which the first is taken."""
+    """The note on a file with several skeletons, of which the first is taken."""
     if len(rigs) < 2:
         return []
     return [

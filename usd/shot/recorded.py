@@ -52,7 +52,7 @@ def seen_as_written(prim: Usd.Prim, border: Border) -> bool:
 
 
 def _strongest(prim: Usd.Prim) -> tuple:
-    """What the strongest layer records, its offset, and the layer: composed, a bake over another one would give a mixture of both."""
+    """What the strongest layer records, its offset, and the layer: composed, a bake over another would give a mixture of both."""
     stack = prim.GetPrimStackWithLayerOffsets()
     told = ((spec.customData[KEY], offset, spec.layer) for spec, offset in stack if KEY in spec.customData)
     return next(told, (None, Sdf.LayerOffset(), None))
@@ -72,19 +72,19 @@ def recorded_cuts(prim: Usd.Prim) -> list[float] | None:
 
 
 def recorded_joint(prim: Usd.Prim) -> str | None:
-    """Path of the joint that carried a groom in its bake, None where it is not recorded."""
+    """Path of the joint that carried a groom in its bake; None if it is not recorded."""
     told = recorded(prim).get("joint")
     return told if isinstance(told, str) else None
 
 
 def recorded_volume(prim: Usd.Prim) -> float:
-    """The stiffness against strands crowding that a simulation was made with; 0 where none is recorded."""
+    """The stiffness against strands crowding that a simulation was made with; 0 if none is recorded."""
     told = recorded(prim).get("volume")
     return told if isinstance(told, float) and 0 <= told < math.inf else 0.0
 
 
 def recorded_material(prim: Usd.Prim) -> Material | None:
-    """The material of a bake, None where it is not recorded.
+    """The material of a bake; None if it is not recorded.
 
     Raises:
         NeuralocksError: what is recorded is not a material.

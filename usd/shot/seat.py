@@ -92,7 +92,7 @@ def off_skin(points: np.ndarray, rig: StageRig, to_bind: np.ndarray) -> float:
 
 
 def either_ends(prim: Usd.Prim, *, last: bool = False) -> list[np.ndarray]:
-    """`some_ends` of all points and, where some lie beyond the drawn ones, of the drawn."""
+    """`some_ends` of all points and, if some are beyond the drawn ones, of the drawn ones."""
     beyond = beyond_ends(prim)
     return [some_ends(prim, last=last, beyond=each) for each in ([None] if beyond is None else [None, beyond])]
 
@@ -136,7 +136,7 @@ def ways(
         rig: what carries the groom.
         mesh: its skin below the groom, if it has one.
         placement: where the groom's prim stands.
-        when: time code at which the groom has the points it is read with, if they are no points at rest.
+        when: time code at which the groom has the points it is read with, if they are not points at rest.
         likely: those that serve unless skin says otherwise, or the others.
         drifts: the result of `_drifts`, if it is known already.
     """
@@ -180,7 +180,7 @@ def unsure(prim: Usd.Prim, seat: Seat, placement: Placement) -> list[str]:
 
 
 def beginnings(rig: StageRig) -> list[float]:
-    """Time codes at which the motion begins, and the shot, where that is after a run-up."""
+    """Time codes at which the motion begins, and the shot begins, if that is after a run-up."""
     (first, last), stage = rig.time_codes[[0, -1]].tolist(), rig.source.prim.GetStage()
     start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else first
     return [first, start] if first < start <= last else [first]

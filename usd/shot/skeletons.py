@@ -65,7 +65,7 @@ def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
             return told, f"told by the bake of {prim.GetPath()}"
         try:
             found = bound_joint(prim, rig, Placement(prim), seated)
-        except NeuralocksError:  # said where this groom is read
+        except NeuralocksError:  # reported when this groom is read
             continue
         if found is not None:
             return found[0], f"by the binding of {found[1]}"

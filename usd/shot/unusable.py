@@ -96,7 +96,7 @@ def lies_on(
 
 
 def _off(roots: np.ndarray, skins: list[cKDTree]) -> float:
-    """Distance of roots (n, 3) from the nearest of some skins, in the median [m]; infinite where none is near."""
+    """Distance of roots (n, 3) from the nearest of some skins, in the median [m]; infinite if none is near."""
     far = [float(np.median(tree.query(roots, distance_upper_bound=2 * NEAR)[0])) for tree in skins]
     return min(far, default=np.inf)
 

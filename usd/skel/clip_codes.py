@@ -65,7 +65,7 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
     samples, steps = _after_steps(np.unique(samples), frame)
     ahead = np.append(steps, np.inf)[np.searchsorted(steps, frames, side="right")] - frames
     frames = frames[ahead >= STEP * frame]
-    # Between close samples a frame would only add their chord, whose kinks are no motion of the body.
+    # Between close samples a frame would only add their chord, whose kinks are not motion of the body.
     near = np.searchsorted(samples, frames, side="right").clip(1, max(len(samples) - 1, 1))
     wide = np.diff(samples, append=samples[-1])[near - 1] > CLOSE * border.rate
     codes = np.unique(np.concatenate([frames[wide], samples]))

@@ -31,7 +31,7 @@ class Skin:
         distance [m].
         """
         distance, found = self._tree.query(points, distance_upper_bound=within)
-        # The tree gives the number of its points where none is near.
+        # The tree gives the number of its points if none is near.
         return distance, self._vertex[found]
 
 

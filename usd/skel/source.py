@@ -48,7 +48,7 @@ def read_rig(
         head: joint that is the head; found by name and hierarchy if left out.
         all_shapes: keep blend shapes that the animation does not use.
         joints: semantic joint -> joint path or its last part, if names are not enough.
-        cuts: time codes from which the character is elsewhere; found if None. Those outside the animation are ignored.
+        cuts: time codes at which the character is suddenly elsewhere; detected if None. Those outside the animation are ignored.
         skins: of the stage, if they were looked for already.
         headless: if no joint is named like a head, read it without one, and without any other semantic joint.
         unbaked: for a rig bake, read the animation that it was made from, with a note if the two differ.
@@ -139,7 +139,7 @@ def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:
 
 
 def _twice(source: JointSource, by_hand: dict[str, str], humanoid: Humanoid) -> list[str]:
-    """The notes on joints that the user gave a meaning while they have another one, too: a joint does not turn relative to itself."""
+    """The notes on joints that the user gave a second meaning: a joint does not turn relative to itself."""
     said = {}
     for name in by_hand:
         others = [other for other in humanoid if other != name and humanoid[other] == humanoid[name]]

@@ -146,7 +146,7 @@ class StageRig:
 
     @cached_property
     def motion_sketch(self) -> str:
-        """What `motion_sketch` tells of it."""
+        """The `motion_sketch` of its skeleton."""
         return motion_sketch(self.source, self.border.rate)
 
     @cached_property

@@ -75,7 +75,7 @@ def bound_meshes(skins: Skins, source: JointSource, notes: list[str]) -> list[St
 
 
 def not_posed(meshes: list[StageMesh], source: JointSource) -> list[str]:
-    """The note on meshes that USD draws as they were made, whatever their skeleton does, because no prim above them is a SkelRoot."""
+    """The note on meshes that USD draws as they were made, whatever their skeleton does, because they have no SkelRoot above."""
     outside = [mesh.prim for mesh in meshes if not any(above.IsA(UsdSkel.Root) for above in _lineage(mesh.prim))]
     if not outside:
         return []
@@ -258,7 +258,7 @@ def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | 
 
 
 def rest_value(attribute: Usd.Attribute):
-    """The default-time value, else the earliest sample."""
+    """The default-time value, otherwise the earliest sample."""
     value = attribute.Get(Usd.TimeCode.Default())
     return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
 

@@ -14,7 +14,7 @@ from tests.blender.panel import drawn
 
 
 def sampled_first(_folder: Path) -> None:
-    """In a window, the first Live says to wait, and is not an error: the motion is sampled automatically, unless that has failed."""
+    """In a window, the first Live says to wait, without an error: the motion is sampled automatically, unless that failed."""
     from dcc_addon import live
     from dcc_addon.session import session
 

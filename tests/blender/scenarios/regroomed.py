@@ -66,7 +66,7 @@ def other_strands(folder: Path) -> None:
 
 
 def replaced_model(folder: Path) -> None:
-    """A model file that is rewritten, for example by another training, moves live hair from the next frame on, as it would a bake."""
+    """A rewritten model file, for example from another training, moves live hair from the next frame on, as it would a bake."""
     rig = scenes.armature()
     scenes.dance(rig)
     strands, model = scenes.hair(rig, 20), folder / "mine.neuralocks"

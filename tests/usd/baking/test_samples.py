@@ -148,7 +148,7 @@ def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatc
 
 @pytest.mark.parametrize("changed", [{"folder": "a/deeper"}, {"cuts": []}, {"joints": {"head": "head"}}])
 def test_a_stopped_bake_goes_on_to_a_file_that_tells_how_it_was_made_now(tmp_path, model, monkeypatch, changed):
-    """If the folder was moved, or recorded options that change no sample differ: a layer that does not find its shot is worthless."""
+    """If the folder was moved, or recorded options that change no sample differ: a layer that finds no shot is worthless."""
     shot, first = write_shot(tmp_path), tmp_path / "one" / "bake.usdc"
     last = tmp_path / changed.pop("folder", "one") / first.name
     monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)

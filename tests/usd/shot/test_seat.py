@@ -207,7 +207,7 @@ def test_a_seat_within_a_bound_is_the_seat(tmp_path, lifted):
 
 
 def test_hair_sits_in_the_middle_of_wide_faces(tmp_path):
-    """A large head, or one with few vertices: hair far from every corner must not count as off the skin, and be placed without it."""
+    """A large head, or one with few vertices: hair far from every corner must not count as off the skin."""
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     mesh, curves = (UsdGeom.PointBased(stage.GetPrimAtPath(f"/Hero/{name}")) for name in ("Skin", "Hair"))
