@@ -35,7 +35,7 @@ class JoinResult:
     Attributes:
         path: the layer written.
         grooms: prim paths.
-        frames: its time codes.
+        frames: time codes in the layer.
         complete: whether every groom has all frames of the shot.
         notes: what a user should know.
     """

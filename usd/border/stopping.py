@@ -12,8 +12,8 @@ from contextlib import contextmanager, suppress
 INTERRUPTED = 130
 """Exit status after Ctrl-C; as shells have it, 128 and the signal's number."""
 _ENDS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-"""Signals that end a command, and who handles them where nobody else does."""
-if hasattr(signal, "SIGHUP"):  # not on Windows; a job of nohup is deaf to it, and stays so
+"""Signals that end a command, and their default handlers."""
+if hasattr(signal, "SIGHUP"):  # not on Windows; under nohup it stays ignored
     _ENDS[signal.SIGHUP] = signal.SIG_DFL
 
 _number = 0
@@ -23,8 +23,8 @@ _deferring = False
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """A signal that ends a command, in this block, and whatever error it led to, ends the program in one word; blocks may lie
-    in each other.
+    """In this block, a signal that ends a command, and any error it leads to, ends the program with one word; blocks may be
+    nested.
     """
     global _number
     with _heeded():

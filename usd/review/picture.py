@@ -66,7 +66,7 @@ def preview(
         scene, border = _strands(baked, tell)
     else:
         scene, border = _scene(baked, grooms, skeleton, head, tell)
-    with deferred():  # what draws loads its modules at any time; the progress checks after each picture
+    with deferred():  # drawing may load modules at any time; progress checks after each picture
         return drawing.render(
             scene,
             path,
