@@ -16,7 +16,7 @@ BIND = np.tile(np.eye(4), (2, 1, 1))
         ((), [], np.zeros((0, 4, 4)), "no joints"),
         (("a", "a"), [-1, 0], BIND, "same path"),
         (("a", "b"), [1, -1], BIND, "before its parent"),
-        (("a", "b"), [-1, 0.5], BIND, "no whole number"),
+        (("a", "b"), [-1, 0.5], BIND, "not a whole number"),
         (("a", "b"), [-1, 0], BIND[:1], "needs 2 finite bind transforms"),
         (("a", "b"), [-1, 0], np.full((2, 4, 4), np.nan), "needs 2 finite bind transforms"),
         (("a", "b"), [-1, 0], BIND * [[[1]], [[0]]], "zero scale"),

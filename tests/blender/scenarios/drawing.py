@@ -102,7 +102,7 @@ def drawn_at_work(folder: Path) -> None:
     scenes.surface_deform(strands)
     strands.neuralocks_hair.live = False
     strands.neuralocks_hair.live = True
-    assert any("Off meanwhile" in line for line in drawn("INFO"))
+    assert any("Off while Live" in line for line in drawn("INFO"))
     assert bpy.ops.neuralocks.report_card() == {"FINISHED"}
     assert " ".join(session.cards["Hair"]) in " ".join(drawn()).replace("\u00a0", " "), session.cards
     give_bone_model(rig, folder)
@@ -127,7 +127,7 @@ def drawn_at_training(_folder: Path) -> None:
     strands = scenes.hair(rig, 10)
     bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
     for answer, said in (
-        (None, "Looking for what training needs"),
+        (None, "Checking what training needs"),
         ("Training needs torch", "needs torch"),
         ("", "Ready to train"),
     ):
