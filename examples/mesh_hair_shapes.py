@@ -86,7 +86,7 @@ def tube(curve, flats, lock: Lock):
     thick /= np.linalg.norm(thick, axis=1, keepdims=True)
     wide = np.cross(tangent, thick)
     share = (arcs - arcs[0]) / (arcs[-1] - arcs[0])
-    size = np.sqrt(np.minimum(1, 0.2 + 2.5 * share)) * np.clip(1 - share**3.5, 0, 1) ** 0.7 + 0.02
+    size = np.sqrt(np.minimum(1, 0.2 + 2.5 * share)) * np.clip(1 - share**2.5, 0, 1) ** 0.8 + 0.02
     angle = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
     across = size[:, None] * lock.half_width * np.cos(angle)
     inwards = np.interp(arcs, [0, ROUND], [1, 0])[:, None] * across**2 / (2 * ROUND)
