@@ -96,6 +96,4 @@ def test_an_engine_turns_the_joints_as_a_bake_does(tmp_path, dynamic, mean, most
             engine = bind @ Rotation.from_quat(turns[row, column, [1, 2, 3, 0]]).as_matrix()
             off[line, column] = np.degrees(Rotation.from_matrix(engine.T @ local[joint, :3, :3].T).magnitude())
     assert off.mean() < mean and off.max() < most
-    assert np.degrees(Rotation.from_quat(turns[..., [1, 2, 3, 0]].reshape(-1, 4)).magnitude()).mean() > 10 * mean, (
-        "the hair moves"
-    )
+    assert np.degrees(Rotation.from_quat(turns[..., [1, 2, 3, 0]].reshape(-1, 4)).magnitude()).mean() > 3
