@@ -36,7 +36,6 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     if os.path.isdir(path) and not os.path.islink(path):  # a link is replaced, whatever it points to
         raise NeuralocksError(f"{path}: is a folder; move it, or choose another name")
     try:
-        check_unprotected(path)
         made = make_way(path)
         try:
             with own_folder(path.parent) as folder:
@@ -61,7 +60,6 @@ def check_writable(path: Path) -> None:
     if path.is_dir():
         raise NeuralocksError(f"{path}: is a folder; give a file name")
     try:
-        check_unprotected(path)
         made = make_way(path)
         try:
             with own_folder(path.parent):
@@ -70,18 +68,6 @@ def check_writable(path: Path) -> None:
             remove_empty(made)
     except OSError as error:
         raise cannot_write(path, error) from None
-
-
-def check_unprotected(path: Path) -> None:
-    """Refuse a file that nobody may write, as published files and those under some version controls are: POSIX systems would
-    let it be replaced all the same.
-
-    Raises:
-        CannotWrite: it is one.
-        OSError: the file system refuses to say.
-    """
-    if path.is_file() and not path.is_symlink() and not path.stat().st_mode & 0o222:
-        raise CannotWrite(f"{path}: is write-protected; make it writable, or choose another name")
 
 
 def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
@@ -177,7 +163,15 @@ def remove_strays(path: Path, ending: str) -> None:
 
 
 def make_way(path: Path) -> list[Path]:
-    """Create the missing folders above a file; returns them, innermost first."""
+    """Create the missing folders above a file that is to be written; returns them, innermost first.
+
+    Raises:
+        CannotWrite: the file is there and nobody may write it, as published files and those under some version controls are:
+            POSIX systems would let it be replaced all the same.
+        OSError: the file system refuses.
+    """
+    if path.is_file() and not path.is_symlink() and not path.stat().st_mode & 0o222:
+        raise CannotWrite(f"{path}: is write-protected; make it writable, or choose another name")
     missing = [folder for folder in path.parents if not os.path.exists(folder)]
     path.parent.mkdir(parents=True, exist_ok=True)
     return missing

@@ -8,7 +8,7 @@ from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.carrier import Carrier, Placing
 from neuralocks_core.deformation.resolve import Resolver
-from neuralocks_core.deformation.root_skin import RootSkin
+from neuralocks_core.deformation.root_skin import ASTRAY, RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
@@ -17,9 +17,6 @@ from neuralocks_core.strands.strand_set import strands_on
 
 from .history import SampledBoundary
 
-ASTRAY = 0.3
-"""Roots farther from skin than this [m], on a person, are not where an artist has put them: hats and wigs are nearer. A bake says
-so, too."""
 SOME = 500
 """So many roots tell where all are."""
 

@@ -21,6 +21,8 @@ STAYS = 1e-6
 """Skin that a shape moves by less than this [m] counts as still."""
 BETTER = 5e-4
 """Hair was groomed on a body with blend shapes if its roots are closer to that body's skin by this much [m] in the median."""
+ASTRAY = 0.3
+"""Roots farther from the skin than this [m], on a person, are not where an artist has put them: hats and wigs are nearer."""
 SOME_ROOTS = 1000
 """About this many roots decide on which body."""
 

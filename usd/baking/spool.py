@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import cannot_write, check_unprotected, make_way, put_in_place, reach_disk, remove_empty
+from neuralocks_core.files import cannot_write, make_way, put_in_place, reach_disk, remove_empty
 from neuralocks_core.lock_file import FolderLock
 
 from ..border.stopping import deferred
@@ -50,7 +50,6 @@ class Spool:
         self._spares: list[Path] = []
         self.folder = _folder(out)
         try:
-            check_unprotected(out)
             self._made = make_way(out)
         except OSError as error:
             raise cannot_write(out, error) from None

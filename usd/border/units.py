@@ -86,6 +86,10 @@ class Border:
         """Times [s] of time codes."""
         return np.asarray(time_codes, float) / self.rate
 
+    def time_codes(self, seconds) -> np.ndarray:
+        """Time codes of times [s]."""
+        return np.asarray(seconds, float) * self.rate
+
     @classmethod
     def of(cls, stage: Usd.Stage) -> "Border":
         """Read and check the stage's metadata.

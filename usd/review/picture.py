@@ -75,7 +75,7 @@ def preview(
             azimuth=view,
             turntable=turntable,
             rate=min(border.rate / border.frame, 30.0),
-            name=lambda time: f"frame {round(time * border.rate, 3):g}",
+            name=lambda time: f"frame {border.time_codes(time).round(3):g}",
             progress=progress,
         )
 
@@ -84,7 +84,7 @@ def _samples(frames: str | None, times: np.ndarray, border: Border) -> np.ndarra
     """Numbers of the samples at `times` [s] that are nearest to the frames asked for, ascending; None for all."""
     if frames is None:
         return None
-    first, last = times[[0, -1]] * border.rate
+    first, last = border.time_codes(times[[0, -1]])
     wanted = np.array(time_codes(frames, first, last, frame=border.frame))
     if wanted[0] < first - border.frame / 2 or wanted[-1] > last + border.frame / 2:
         raise NeuralocksError(f"--frames {frames}: the bake has frames {first:g} to {last:g}; choose from these")

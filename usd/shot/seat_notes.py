@@ -6,6 +6,7 @@ from pxr import Usd
 from scipy.spatial import cKDTree
 
 from neuralocks_core.character import Character
+from neuralocks_core.deformation.root_skin import ASTRAY
 from neuralocks_core.rotation import inverse, sizes, transformed
 
 from ..border.placement import Placement
@@ -15,8 +16,6 @@ from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends, so
 
 TOUCHES = 0.003
 """Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
-ASTRAY = 0.3
-"""Bound hair farther from skin than this [m], on a person, is not where its author has put it: hats and wigs are nearer."""
 COARSE = 2e-4
 """If single precision can only put points this far apart [m], strands, which are about half as thick, tremble."""
 LEVEL = 0.001

@@ -13,12 +13,7 @@ from tests.blender.checks import MODEL, SAME, apart, make_live, messages, needs_
 def linked(folder: Path) -> None:
     """A linked character: clear words; an override plays its bake; local curves are live; nothing is lost."""
     needs_usd()
-    rig = scenes.armature()
-    scenes.dance(rig)
-    scenes.hair(rig, 20)
-    scene = bpy.context.scene
-    scenes.collect("Character")
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    _character_library(folder)
     scenes.empty()
     with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
         wanted.collections = ["Character"]
@@ -78,11 +73,7 @@ def linked(folder: Path) -> None:
 
 def instanced(folder: Path) -> None:
     """A character that is a collection instance: the message says so, and each remedy that it names works."""
-    rig = scenes.armature()
-    scenes.dance(rig)
-    scenes.hair(rig, 20)
-    scenes.collect("Character")
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    _character_library(folder)
 
     def instance(link: bool):
         scenes.empty()
@@ -238,11 +229,7 @@ def appended(folder: Path) -> None:
 
 def of_one_name(folder: Path) -> None:
     """What was taken out of the scene is not taken for what another file has under its name, and is in the scene."""
-    rig = scenes.armature()
-    scenes.dance(rig)
-    scenes.hair(rig, 10)
-    scenes.collect("Character")
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    _character_library(folder)
     scenes.empty()
     with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
         wanted.collections = ["Character"]
@@ -260,3 +247,12 @@ def of_one_name(folder: Path) -> None:
     refused(bpy.ops.neuralocks.sample_motion, "no armature chosen")
     scene.collection.objects.link(rig)
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+
+
+def _character_library(folder: Path) -> None:
+    """A file `library.blend` with a collection `Character`: a dancing armature with hair."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    scenes.hair(rig, 20)
+    scenes.collect("Character")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
