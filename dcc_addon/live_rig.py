@@ -4,6 +4,7 @@
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
+from .blowing import in_core
 from .kept import Bound
 from .models import model_path, stamp
 from .pose import pose
@@ -39,7 +40,8 @@ def _update(armature, scene, graph, moved) -> None:
         show_rest(armature)
     joints = pose(armature, sampled, scene, graph, moved)
     settings = armature.neuralocks_character
-    turns = bones.turns([shown_frame(scene) / sampled.motion.rate], settings.rig_motion, joints[None])[0]
+    time, wind = shown_frame(scene) / sampled.motion.rate, in_core(armature)
+    turns = bones.turns([time], settings.rig_motion, joints[None], wind)[0]
     if not settings.rig_kept:
         settings.rig_kept = rotations.kept(armature, bones.bones)
     own = armature.pose.bones

@@ -12,6 +12,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.rotation import inverse
 
 from . import edited, joined, preparing
+from .blowing import in_core
 from .kept import Prepared
 from .models import load_model, model_path, stamp
 from .pose import pose
@@ -85,7 +86,8 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
         sampled.stale = session.wanting = True
     to_local = inverse(core @ place)
     time = frame / sampled.motion.rate
-    wanted = time, joints, to_local, material(settings), typed(settings, MOTION.name), settings.resolve
+    wind = in_core(armature)
+    wanted = time, joints, to_local, material(settings), typed(settings, MOTION.name), wind, settings.resolve
     prepared = prepare(hair, sampled, wanted, wait)
     if prepared is None:
         show_rest(hair)

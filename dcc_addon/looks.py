@@ -5,10 +5,12 @@ from typing import NamedTuple
 
 from neuralocks_core.errors import NeuralocksError
 
+from .blowing import blowing
 from .live_strands import material_words, typed
-from .models import model_path
+from .models import load_model, model_path
 from .scene import curves
 from .services.sliders import MOTION
+from .services.wind import Blowing
 
 
 class Look(NamedTuple):
@@ -18,6 +20,7 @@ class Look(NamedTuple):
     motion: float
     resolve: bool
     model: str
+    blowing: Blowing | None
 
 
 def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
@@ -54,4 +57,6 @@ def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
 
 def _look(hair) -> Look:
     settings = hair.neuralocks_hair
-    return Look(tuple(material_words(settings)), typed(settings, MOTION.name), settings.resolve, model_path(hair))
+    path = model_path(hair)
+    wind = blowing(settings.armature) if load_model(path).feels_wind else None
+    return Look(tuple(material_words(settings)), typed(settings, MOTION.name), settings.resolve, path, wind)

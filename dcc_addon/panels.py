@@ -89,6 +89,31 @@ def _motion(layout, armature, scene) -> None:
     message(layout, armature.name_full)
 
 
+class NEURALOCKS_PT_wind(_Panel, bpy.types.Panel):
+    """The wind in this character's hair"""
+
+    bl_label = "Wind"
+    bl_parent_id = "NEURALOCKS_PT_character"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene.neuralocks.armature is not None
+
+    def draw(self, context):
+        layout, armature = self.layout, context.scene.neuralocks.armature
+        layout.use_property_split, layout.use_property_decorate = True, False
+        own = armature.neuralocks_character
+        layout.prop(own, "wind", slider=True, text="Strength")
+        column = layout.column()
+        column.active = own.wind > 0
+        column.prop(own, "wind_direction")
+        column.prop(own, "gusts")
+        bound = session.chains.get(armature.name_full)
+        if own.wind > 0 and bound is not None and not bound.bones.model.feels_wind:
+            words(layout, "The model of the hair bones is for held poses, so they feel no wind", "INFO")
+
+
 class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
     """Strand hair"""
 
@@ -134,6 +159,8 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
                 f"Its roots are {far:.2g} m from the skin; put its object where the head is in the rest pose",
                 "INFO",
             )
+        if prepared is not None and not prepared.hair.model.feels_wind and own.armature.neuralocks_character.wind > 0:
+            words(layout, "The model is for held poses, so this hair feels no wind", "INFO")
         if off := off_meanwhile(hair):
             words(layout, f"Off while Live, or the hair would move twice: {', '.join(off)}", "INFO")
         column = layout.column(align=True)
@@ -287,4 +314,4 @@ def progress(layout, done: float, text: str) -> None:
         layout.label(text=text, icon="TIME")
 
 
-CLASSES = (NEURALOCKS_PT_character, NEURALOCKS_PT_strands, NEURALOCKS_PT_rig, NEURALOCKS_PT_bake)
+CLASSES = (NEURALOCKS_PT_character, NEURALOCKS_PT_wind, NEURALOCKS_PT_strands, NEURALOCKS_PT_rig, NEURALOCKS_PT_bake)

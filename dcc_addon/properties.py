@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is saved in the file: settings of each hair object and of each character, and what the panel shows."""
 
+import math
+
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+
+from neuralocks_core.wind import STRONGEST
 
 from . import background, live
 from .scene.paths import FILE
@@ -74,6 +78,10 @@ def _character_changed(settings, context) -> None:
 def _range_changed(_settings, context) -> None:
     live.refresh(context.scene)
     background.request()
+
+
+def _wind_changed(_character, context) -> None:
+    live.refresh(context.scene, wait=by_script(context))
 
 
 def _loop_changed(character, context) -> None:
@@ -151,6 +159,35 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="The frame range repeats: its last frame shows the pose of its first, and hair on the first "
         "frame remembers the end of the range",
         update=_loop_changed,
+        **SETTING,
+    )
+    wind: FloatProperty(
+        name="Wind",
+        description="How strongly a wind accelerates this character's hair, in m/s² (gravity is 9.81); 0 is a calm",
+        default=0.0,
+        min=0.0,
+        max=STRONGEST,
+        update=_wind_changed,
+        **SETTING,
+    )
+    wind_direction: FloatProperty(
+        name="Direction",
+        description="Where the wind blows to, seen from above: 0° is along the world's X axis, 90° along Y",
+        subtype="ANGLE",
+        default=0.0,
+        min=-2 * math.pi,
+        max=2 * math.pi,
+        update=_wind_changed,
+        **SETTING,
+    )
+    gusts: FloatProperty(
+        name="Gusts",
+        description="Share by which the wind comes and goes",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_wind_changed,
         **SETTING,
     )
     rig_model: StringProperty(

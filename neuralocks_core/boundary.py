@@ -18,6 +18,7 @@ from neuralocks_core.measures import measures_read
 from neuralocks_core.motion import GRAVITY, Clip, G
 from neuralocks_core.stepped import Stepped
 from neuralocks_core.track import Track
+from neuralocks_core.wind import Wind, check_felt
 
 
 def joints_read(character: Character, pose_joints=POSE_JOINTS) -> list[int]:
@@ -63,7 +64,12 @@ class BoundarySampler:
         return softened(clip, self.character, self.GRAVITY_LIMIT, self.spec.dt)
 
     def vectors(
-        self, times, material=(0.0,) * MATERIALS, strength: float = 1.0, joints: np.ndarray | None = None
+        self,
+        times,
+        material=(0.0,) * MATERIALS,
+        strength: float = 1.0,
+        joints: np.ndarray | None = None,
+        wind: Wind | None = None,
     ) -> np.ndarray:
         """Boundary vectors (n, spec.size) float32 at times (n,) [s].
 
@@ -73,9 +79,11 @@ class BoundarySampler:
             strength: motion strength; scales the history and is exact at 0 (the held pose).
             joints: the world joint transforms (n, J, 4, 4) that are drawn at these times, if they are known
                 better than from the clip.
+            wind: added to the history, whatever the strength: hair feels a wind w as it feels the head accelerate by -w.
 
         Raises:
-            NeuralocksError: a time, material or strength is not finite, or an array has the wrong shape.
+            NeuralocksError: a time, material or strength is not finite, an array has the wrong shape, or there is a wind
+                that this spec has no place for.
         """
         spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
         if times.ndim > 1:
@@ -90,7 +98,7 @@ class BoundarySampler:
         if not len(times):
             return np.zeros((0, spec.size), np.float32)
         lags = spec.dt * np.arange(spec.steps + 2)
-        position, turns = self._sample(times, lags)
+        position, turns, shown = self._sample(times, lags)
         now = turns[:, 0] if joints is None else self.character.relative_rotations(joints, self.joints)
         result = np.zeros((len(times), spec.size), np.float32)
         parts = spec.slices
@@ -103,6 +111,8 @@ class BoundarySampler:
         result[:, parts["material"]] = _log_ratios(material, len(times))
         if spec.bins:
             result[:, parts["history"]] = strength * self._history(position, turns, static)
+        if wind is not None:
+            result[:, parts["history"]] += self._blown(wind, turns, shown[:, None] - lags)
         return result
 
     def held_bind(self, material=(0.0,) * MATERIALS, shape: np.ndarray | None = None) -> np.ndarray:
@@ -123,20 +133,21 @@ class BoundarySampler:
             self._shape_cache[key] = measures_read(self.character, shape)
         return self._shape_cache[key]
 
-    def _sample(self, times: np.ndarray, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _sample(self, times: np.ndarray, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Head positions (n, L, 3) and rotations (n, L, joints, 3, 3) at times (n,) minus lags (L,), as if there had been nothing
-        before the last cut.
+        before the last cut; and the times (n,) whose motion is shown, which differ in animation on twos.
         """
         position = np.empty((len(times), len(lags), 3))
         turns = np.empty((len(times), len(lags), len(self.joints), 3, 3))
+        shown = np.empty(len(times))
         part = np.searchsorted(self._cuts - 1e-9, times, side="right")
         for one in np.unique(part):
             rows = part == one
-            shown = self._stepped[one].times(times[rows])
-            places, rotations = self._tracks[one].at((shown[:, None] - lags).ravel())
+            shown[rows] = self._stepped[one].times(times[rows])
+            places, rotations = self._tracks[one].at((shown[rows, None] - lags).ravel())
             position[rows] = places.reshape(-1, len(lags), 3)
             turns[rows] = rotations.reshape(-1, len(lags), len(self.joints), 3, 3)
-        return position, turns
+        return position, turns, shown
 
     def _history(self, position, turns, static) -> np.ndarray:
         """(n, per_bin * bins): means over the bins, newest first, tapered."""
@@ -154,9 +165,20 @@ class BoundarySampler:
             step = turns[:, :-2, joint] @ np.swapaxes(turns[:, 1:-1, joint], -1, -2)
             spin = rotation.to_vector(step) / spec.dt
             columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, spin), self.SPIN_LIMIT))
-        rows = np.concatenate(columns, axis=-1)
-        ends = np.cumsum(spec.bins)
-        means = np.add.reduceat(rows, np.concatenate([[0], ends[:-1]]), axis=1) / np.asarray(spec.bins)[:, None]
+        return self._binned(np.concatenate(columns, axis=-1))
+
+    def _blown(self, wind: Wind, turns: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """What a wind adds to `_history`, with the head's rotations at times (n, L)."""
+        check_felt(self.spec.feels_wind)
+        push = wind.at(times[:, :-2], self.clip.end - self.clip.start if self.clip.loop else 0.0) / G
+        rows = np.zeros((*push.shape[:2], self.spec.per_bin))
+        rows[..., :3] = np.einsum("nkji,nkj->nki", turns[:, :-2, 0], push)
+        return self._binned(rows)
+
+    def _binned(self, rows: np.ndarray) -> np.ndarray:
+        """Means (n, bins * per_bin) of values (n, steps, per_bin) over each bin, newest first, tapered."""
+        ends = np.cumsum(self.spec.bins)
+        means = np.add.reduceat(rows, np.concatenate([[0], ends[:-1]]), axis=1) / np.asarray(self.spec.bins)[:, None]
         return (means * self._bin_weights[:, None]).reshape(len(rows), -1)
 
 

@@ -88,6 +88,11 @@ class BoundarySpec:
         """Numbers per history bin."""
         return 3 * ((self.linear != "none") + 1 + self.chest)
 
+    @property
+    def feels_wind(self) -> bool:
+        """Whether there is a place for wind: a history of effective gravity."""
+        return bool(self.bins) and self.linear == "gravity"
+
     @cached_property
     def slices(self) -> dict[str, slice]:
         """Where pose, gravity, shape, material and history lie in the vector."""

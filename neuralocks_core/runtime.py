@@ -80,6 +80,11 @@ class StrandModel:
         """
         return cls(model_file.read(path or model_file.shipped("strands"), "strands"), threads)
 
+    @property
+    def feels_wind(self) -> bool:
+        """Whether wind moves its hair: it reads a history of effective gravity, which training has not left out."""
+        return self.spec.feels_wind and self.meta.get("static") is not True
+
     def sampler(self, character: Character, clip: Clip) -> BoundarySampler:
         """Boundary vectors as this model reads them."""
         return BoundarySampler(self.spec, character, clip)

@@ -135,6 +135,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
                     material=list(look.material),
                     strength=look.motion,
                     resolve=look.resolve,
+                    **(look.blowing._asdict() if look.blowing else {}),
                     loop=sampled.clip.loop,
                     progress=say,
                 )

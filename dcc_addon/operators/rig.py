@@ -9,6 +9,7 @@ from bpy.props import StringProperty
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
+from ..blowing import blowing, in_core
 from ..live import refresh
 from ..live_rig import bind, rest, show_rest
 from ..models import model_path
@@ -71,11 +72,12 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         finally:  # if the new keys cannot be made, earlier ones, and Live, stay as they were
             refresh(scene)
         frames = frame_numbers(first, last, scene.neuralocks.subframes)
-        turns = bones.turns(frames / sampled.motion.rate, armature.neuralocks_character.rig_motion)
+        settings = armature.neuralocks_character
+        turns = bones.turns(frames / sampled.motion.rate, settings.rig_motion, wind=in_core(armature))
         own = own_turns(sampled.own, sampled.motion, bones.joints, frames)
         # Blender evaluates animation at stretched time.
         stretched = frames * (scene.render.frame_map_old / scene.render.frame_map_new)
-        armature.neuralocks_character.rig_live = False
+        settings.rig_live = False
         rest(armature)
         action = actions.bake_keys(armature, bones.bones, stretched, turns, own)
         return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
@@ -126,12 +128,14 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         shot = shot_beside(out)
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name), share=0.5)
-        bind(named(name), sampled)  # reports what is wrong before anything is written
+        bones = bind(named(name), sampled).bones  # reports what is wrong before anything is written
+        wind = blowing(named(name)) if bones.model.feels_wind else None
+        options = {"strength": strength, **(wind._asdict() if wind else {})}
         head, loop = sampled.character.skeleton.names[sampled.character.head], sampled.clip.loop
         with undone_on_failure(out, shot):
             prims = write_shot(shot, named(name), scene, sampled, [])
             job = Threaded(
-                lambda say: bake_rig(shot, out, model, head=head, strength=strength, loop=loop, progress=say),
+                lambda say: bake_rig(shot, out, model, head=head, loop=loop, **options, progress=say),
                 "Baking the hair bones",
             )
             result = yield from job.steps(0.5)

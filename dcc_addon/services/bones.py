@@ -12,6 +12,7 @@ from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
 from neuralocks_core.rig.carried import CarriedHair
 from neuralocks_core.rig.measuring import placed_chains
 from neuralocks_core.rotation import flat, rotation_part, to_quaternion
+from neuralocks_core.wind import Wind
 
 from .hidden import NONE
 from .motion import Motion
@@ -82,8 +83,11 @@ class LiveBones:
         if getattr(self, "_clip", None) is not clip:
             self._clip, self._carried = clip, CarriedHair(self.model, self.joints, character, clip)
 
-    def turns(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
+    def turns(
+        self, times, strength: float = 1.0, joints: np.ndarray | None = None, wind: Wind | None = None
+    ) -> np.ndarray:
         """Rotations (T, N, 4) wxyz of the hair bones in their own rest axes, at times (T,) [s]; joints (T, J, 4, 4) are the drawn
-        poses.
+        poses. A model of held poses does not feel the wind.
         """
-        return self.model.chains.turns_on(self.chains, self._carried.turns(times, strength, joints))
+        felt = wind if self.model.feels_wind else None
+        return self.model.chains.turns_on(self.chains, self._carried.turns(times, strength, joints, felt))

@@ -4,6 +4,7 @@
 import numpy as np
 
 from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.wind import Wind
 
 BLOCK = 8
 """Samples made together: each then costs a third of one made alone, and the frame that makes them is hardly slower."""
@@ -21,18 +22,20 @@ class SampledBoundary:
         self._look: tuple = ()
         self._blocks: dict[int, np.ndarray] = {}
 
-    def vector(self, time: float, material: np.ndarray, strength: float, joints: np.ndarray) -> np.ndarray:
+    def vector(
+        self, time: float, material: np.ndarray, strength: float, joints: np.ndarray, wind: Wind | None = None
+    ) -> np.ndarray:
         """The vector (size,) at a time [s], with the world joints (J, 4, 4) that are drawn there."""
         clip = self._clip
         row = int(np.searchsorted(clip.times, time - 1e-9))
         sampled = row < len(clip.times) and abs(clip.times[row] - time) < 1e-9
         if not sampled or not np.array_equal(joints, clip.joints[row]):
-            return self._sampler.vectors([time], material, strength, joints[None])[0]
-        look = *material, strength
+            return self._sampler.vectors([time], material, strength, joints[None], wind)[0]
+        look = *material, strength, wind
         if look != self._look:
             self._look, self._blocks = look, {}
         first = row - row % BLOCK
         if first not in self._blocks:
             rows = slice(first, first + BLOCK)
-            self._blocks[first] = self._sampler.vectors(clip.times[rows], material, strength, clip.joints[rows])
+            self._blocks[first] = self._sampler.vectors(clip.times[rows], material, strength, clip.joints[rows], wind)
         return self._blocks[first][row - first]

@@ -14,6 +14,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.runtime import StrandModel, chunks
 from neuralocks_core.strands.strand_set import strands_on
+from neuralocks_core.wind import Wind
 
 from .history import SampledBoundary
 
@@ -74,6 +75,7 @@ class LiveHair:
         to_local: np.ndarray,
         material=(0.0,) * 4,
         strength: float = 1.0,
+        wind: Wind | None = None,
         resolve: bool = False,
     ) -> np.ndarray:
         """Points of the groom at one time.
@@ -84,12 +86,13 @@ class LiveHair:
             to_local: transform (4, 4) from the core's world space to the space wanted.
             material: log-ratios (4,).
             strength: motion strength, 0 for a held pose.
+            wind: in core axes; a model of held poses does not feel it.
             resolve: push hair out of the body.
 
         Returns:
             (P, 3) float32, valid until the next call.
         """
-        vector = self._boundary.vector(time, material, strength, joints)
+        vector = self._boundary.vector(time, material, strength, joints, wind if self.model.feels_wind else None)
         if self._held != (held := np.asarray(material).tobytes()):
             self._session.anchor(self._sampler.held_bind(material))
             self._held = held

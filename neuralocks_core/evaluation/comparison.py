@@ -19,6 +19,7 @@ from neuralocks_core.smooth_motion import SmoothMotion
 from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
+from neuralocks_core.wind import Wind
 
 STEP = 1 / 30
 """Time step of the reference [s]: the one that models are trained on."""
@@ -63,6 +64,7 @@ def simulated(
     times: np.ndarray,
     material: Material | None = None,
     *,
+    wind: Wind | None = None,
     volume: float = 0.0,
     progress: Progress | None = None,
 ) -> np.ndarray:
@@ -77,6 +79,7 @@ def simulated(
         clip: the motion. For a loop, the first time should be RUN_IN before the second.
         times: (T,) [s].
         material: of the hair.
+        wind: that blows all the time.
         volume: stiffness against strands crowding closer than at rest [m^2/s^2]; models are trained without.
         progress: called with (done, total, message).
 
@@ -91,7 +94,7 @@ def simulated(
         )
     parts = clip.parts
     part = np.searchsorted([p.start - 1e-9 for p in parts[1:]], times, side="right")
-    options = {"volume": volume, "progress": progress}
+    options = {"wind": wind, "volume": volume, "progress": progress}
     result = np.empty((len(times), *strands.rest.shape), np.float32)
     for i in np.unique(part):
         start = times[0] if i == part[0] else parts[i].start
@@ -99,7 +102,7 @@ def simulated(
     return result
 
 
-def _from(start: float, character, strands, clip, times, material, **options) -> np.ndarray:
+def _from(start: float, character, strands, clip, times, material, wind: Wind | None, **options) -> np.ndarray:
     """The same as `simulated`, for a clip without cuts, with hair at rest at `start` [s]."""
     from neuralocks_core.reference import simulate
 
@@ -122,6 +125,7 @@ def _from(start: float, character, strands, clip, times, material, **options) ->
         dt=STEP,
         neighbours=lock_mates(strands.rest, strands.lock),
         bind_body=bind,
+        wind=wind and wind.at(clock, clip.end - clip.start if clip.loop else 0.0),
         **options,
     )
     return _between(clock, rollout.points, times) - strands.rest

@@ -65,3 +65,15 @@ def check_body(body: Any, triangles: np.ndarray | None, frames: int) -> tuple[np
     if faces.min() < 0 or faces.max() >= len(first):
         raise NeuralocksError(f"triangles: name vertices outside 0..{len(first) - 1}")
     return first, faces
+
+
+def check_wind(wind: np.ndarray | None, frames: int) -> np.ndarray:
+    """(T, 3) float64, zeros for None.
+
+    Raises:
+        NeuralocksError: wrong shape, or not finite.
+    """
+    wind = np.zeros((frames, 3)) if wind is None else np.asarray(wind, np.float64)
+    if wind.shape != (frames, 3) or not np.isfinite(wind).all():
+        raise NeuralocksError(f"wind: shape {wind.shape}; give finite accelerations {(frames, 3)}, one for each frame")
+    return wind

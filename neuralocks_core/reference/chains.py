@@ -59,7 +59,14 @@ class ChainSolver:
         self.contact_stiffness = (self.STIFFNESS * mass / np.maximum(np.bincount(owner, minlength=count), 1))[owner]
 
     def simulate(
-        self, heads: np.ndarray, step: float, body: BodyPoints | None = None, *, substeps: int = 2, warm_up: int = 60
+        self,
+        heads: np.ndarray,
+        step: float,
+        body: BodyPoints | None = None,
+        wind: np.ndarray | None = None,
+        *,
+        substeps: int = 2,
+        warm_up: int = 60,
     ):
         """Turns (C, T, N, 4) wxyz, canonical, of the joints.
 
@@ -67,6 +74,7 @@ class ChainSolver:
             heads: canonical space to world, (C, T, 4, 4).
             step: time between samples [s].
             body: the body to collide with.
+            wind: acceleration of the hair at each sample, in world axes, (T, 3) [m/s^2]; it is constant between samples.
             substeps: integration steps per sample.
             warm_up: steps at the first pose before the motion begins, so that it begins at rest.
         """
@@ -76,6 +84,7 @@ class ChainSolver:
         turns = np.zeros((clips, len(self.chains), 4))
         turns[..., 0] = 1
         limit, near = self._limits(body), None
+        pull = GRAVITY * self.weight + (np.zeros((samples, 3)) if wind is None else wind)
         result = np.empty((clips, samples, len(self.chains), 4), np.float32)
         before = last = None
         previous = heads[:, 0]
@@ -91,7 +100,7 @@ class ChainSolver:
                 if sample == 0:  # settles without momentum
                     before = last
                 flight = np.einsum("cji,cmj->cmi", rotation, 2 * last - before - origin[:, None])
-                gravity = np.einsum("cji,j->ci", rotation, GRAVITY * self.weight)
+                gravity = np.einsum("cji,j->ci", rotation, pull[sample])
                 if part == 0 and body is not None:
                     near = NearestVertices(body.points[:, sample], body.normals[:, sample])
                 turns, ends = self._step(turns, ends, flight, gravity, h, near, limit)

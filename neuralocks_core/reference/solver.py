@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import COLLISION, MARGIN
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
-from neuralocks_core.reference.arguments import check_body, check_material, check_neighbours
+from neuralocks_core.reference.arguments import check_body, check_material, check_neighbours, check_wind
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 
@@ -53,6 +53,7 @@ def simulate(
     margin: float = MARGIN,
     collision: float = COLLISION,
     gravity: float = G,
+    wind: np.ndarray | None = None,
     volume: float = 0.0,
     planes: bool = False,
     device: str = "cpu",
@@ -82,6 +83,7 @@ def simulate(
         margin: distance kept from the body [m], or a vertex's own distance at rest if that is less.
         collision: stiffness of the contact [1/(m s^2)].
         gravity: [m/s^2].
+        wind: acceleration (T, 3) of all hair in each frame, in world axes [m/s^2]; it is linear between frames.
         volume: stiffness against strands crowding closer than at rest [m^2/s^2], 0 for none; see `volume`.
         planes: return the body planes, which take more memory than the points.
         device: "cpu", "cuda" or "cuda:N".
@@ -104,7 +106,7 @@ def simulate(
     # relative to the head's first position: far from the world's origin, rounding would dominate
     away = way.origin[0]
     way = replace(way, origin=way.origin - away)
-    material = check_material(material, strands)
+    material, wind = check_material(material, strands), check_wind(wind, frames)
     result = _empty_rollout(frames, strands, vertices, planes)
     if strands == 0:
         return result
@@ -132,12 +134,14 @@ def simulate(
             bind_body = first @ np.asarray(head[0], np.float64)[:3, :3]
         stepper.attach_body(np.asarray(bind_body), faces)
         stepper.move_body(first)
+    stepper.blow(wind[0])
     _begin(stepper, way, rods, start, iterations)
     for frame in range(frames):
         steps = [] if frame == 0 else range((frame - 1) * substeps + 1, frame * substeps + 1)
         for step in steps:
             if body is not None:
                 stepper.move_body(_between(body, step, substeps) - away)
+            stepper.blow(_between(wind, step, substeps))
             stepper.step(way.turn[step], way.origin[step], dt / substeps, iterations)
         left = stepper.read(result.points[frame], result.planes[frame] if planes else None)
         result.residual[frame], result.iterations[frame] = left
@@ -162,10 +166,10 @@ def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, i
     stepper.start_moving(before)
 
 
-def _between(body: Any, step: int, substeps: int) -> np.ndarray:
-    """Body points at a substep: linear between frames."""
+def _between(values: Any, step: int, substeps: int) -> np.ndarray:
+    """Body points or wind at a substep: linear between frames."""
     frame, part = divmod(step, substeps)
     if part == 0:
-        return np.asarray(body[frame])
+        return np.asarray(values[frame])
     blend = part / substeps
-    return (1 - blend) * np.asarray(body[frame]) + blend * np.asarray(body[frame + 1])
+    return (1 - blend) * np.asarray(values[frame]) + blend * np.asarray(values[frame + 1])

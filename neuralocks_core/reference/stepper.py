@@ -56,7 +56,7 @@ class Stepper:
         self.device = wp.get_device(device)
         self.strands, self.vertices = rods.mass.shape
         self.widest, self.tolerance = margin, tolerance
-        self.gravity = wp.vec3d(0.0, -gravity, 0.0)
+        self.gravity, self.wind = wp.vec3d(0.0, -gravity, 0.0), wp.vec3d()
         self._upload_strands(rods, material, neighbours)
         self.support = self._vectors(rods.support * (gravity / G))
         self._empty_state(margin, collision)
@@ -129,6 +129,10 @@ class Stepper:
         staged = self.wp.array(points, dtype=self.wp.vec3, device="cpu", copy=False)
         self.wp.copy(self.body, staged)
         self.mesh.refit()
+
+    def blow(self, wind: np.ndarray) -> None:
+        """Set the acceleration (3,) that is added to gravity from now on, in world axes [m/s^2], whatever the hair's weight."""
+        self.wind = self.wp.vec3d(*(float(v) for v in wind))
 
     def begin(self, turn: np.ndarray, origin: np.ndarray, points: np.ndarray) -> None:
         """Set the first pose, the head's rotation (4,) xyzw and position (3,) [m], and (S, K, 3) canonical points [m]."""
@@ -209,7 +213,7 @@ class Stepper:
     def _gather(self, inverse_dt: float, settling: int) -> None:
         args = (
             self.constants.mass, self.rest, self.support, self.weight, self.damping, self.clumping, self.neighbours,
-            self.turn, self.gravity, self.carry, self.carry_origin, inverse_dt, settling,
+            self.turn, self.gravity, self.wind, self.carry, self.carry_origin, inverse_dt, settling,
             self.x, self.last, self.before, self.load.target, self.load.pull,
         )  # fmt: skip
         self._run(self.kernels.forces, args)

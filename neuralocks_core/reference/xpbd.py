@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
-from neuralocks_core.reference.arguments import check_body, check_material
+from neuralocks_core.reference.arguments import check_body, check_material, check_wind
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 from neuralocks_core.reference.solver import SimulatedHair
@@ -31,6 +31,7 @@ def simulate_xpbd(
     bind_body: np.ndarray | None = None,
     margin: float = MARGIN,
     gravity: float = G,
+    wind: np.ndarray | None = None,
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> SimulatedHair:
@@ -40,8 +41,8 @@ def simulate_xpbd(
     one pass leaves; how stiff hair really is depends on the number of substeps.
 
     Args:
-        rest, head, body, triangles, material, dt, rest_support, bind_body, margin, gravity, device, progress: as in
-            `solver.simulate`.
+        rest, head, body, triangles, material, dt, rest_support, bind_body, margin, gravity, wind, device, progress: as
+            in `solver.simulate`.
         substeps: per frame.
 
     Returns:
@@ -55,6 +56,7 @@ def simulate_xpbd(
     rods, way, frames = rest_rods(rest, rest_support=rest_support), head_motion(head, substeps), len(head)
     strands, vertices = rods.mass.shape
     hair = _Hair(rods, way, check_material(material, strands), margin, gravity, device)
+    wind = check_wind(wind, frames)
     step, first = dt / substeps, head[0, :3, :3].astype(float)
     hair.begin(first, (way.origin[1] - way.origin[0]) / step if frames > 1 else np.zeros(3))
     if body is not None:
@@ -66,7 +68,7 @@ def simulate_xpbd(
         if body is not None:
             hair.look(np.asarray(body[t]) - way.origin[b], a, b)
         if t:
-            hair.go(a, b, step)
+            hair.go(a, b, step, wind[t])
         hair.read(head[t], points[t])
         if progress:
             progress(t + 1, frames, "simulating")
@@ -121,15 +123,15 @@ class _Hair:
         carry = turn * self.wp.quat_inverse(before)
         self._run(self.kernels.look, self.shape, self.mesh.id, REACH, turn, carry, self.x, self.plane)
 
-    def go(self, a: int, b: int, step: float) -> None:
-        """Advance from substep a to b, each of `step` [s]."""
-        wp = self.wp
+    def go(self, a: int, b: int, step: float, wind: np.ndarray) -> None:
+        """Advance from substep a to b, each of `step` [s], in a wind (3,) [m/s^2]."""
+        wp, wind = self.wp, self.wp.vec3(*(float(v) for v in wind))
         turns = wp.array(self.way.turn[a : b + 1].astype(np.float32), dtype=wp.quat, device=self.device)
         way = self.way.origin[a : b + 1]
         moves = wp.array(np.diff(way, axis=0, prepend=way[:1]).astype(np.float32), dtype=wp.vec3, device=self.device)
         self._run(
             self.kernels.frame, self.strands, self.length, self.inverse_mass, self.stiffness, self.curl, self.home,
-            self.push, self.weight, self.damping, turns, moves, self.gravity, step, self.plane, self.limit, self.x,
+            self.push, self.weight, self.damping, turns, moves, self.gravity, wind, step, self.plane, self.limit, self.x,
             self.old, self.velocity, self.twist, self.waiting,
         )  # fmt: skip
 

@@ -9,6 +9,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig.network import RigModel, RigSampler
 from neuralocks_core.rotation import angle_between, flat, rotation_part, volumes
+from neuralocks_core.wind import Wind
 
 TURNED = np.radians(0.5)
 """A carrier that never turns relative to the head by more than this [rad], and never shifts by more than `SHIFTED`, counts as one
@@ -43,11 +44,13 @@ class CarriedHair:
             for one in self.carriers
         ]
 
-    def turns(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
+    def turns(
+        self, times, strength: float = 1.0, joints: np.ndarray | None = None, wind: Wind | None = None
+    ) -> np.ndarray:
         """Turns (n, N, 4) wxyz float32 in the model's bind axes; the arguments are those of `RigSampler.features`."""
         result = np.empty((np.size(times), len(self.model.chains), 4), np.float32)
         for rows, sampler in self._parts:
-            result[:, rows] = self.model.evaluate(sampler.features(times, strength, joints))[:, rows]
+            result[:, rows] = self.model.evaluate(sampler.features(times, strength, joints, wind))[:, rows]
         return result
 
 

@@ -20,6 +20,7 @@ from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import half_turns
+from neuralocks_core.wind import Wind
 
 DYNAMIC_BINS = (1,) * 6 + (2,) * 4 + (3,) * 4 + (4,) * 2 + (6,) * 2
 """46 steps of 1/30 s: a second and a half, finest for the newest ones."""
@@ -97,6 +98,11 @@ class RigModel:
     def dynamic(self) -> bool:
         """Whether it reads a history."""
         return bool(self.spec.bins)
+
+    @property
+    def feels_wind(self) -> bool:
+        """Whether wind moves its hair."""
+        return self.spec.feels_wind
 
     def evaluate(self, features: np.ndarray) -> np.ndarray:
         """Turns of all hair joints for one avatar (F,) or a batch (B, F).
@@ -203,9 +209,11 @@ class RigSampler:
         self._sampler = BoundarySampler(spec, replace(character, body=None), clip)
         self._columns = feature_columns(spec)
 
-    def features(self, times, strength: float = 1.0, joints: np.ndarray | None = None) -> np.ndarray:
+    def features(
+        self, times, strength: float = 1.0, joints: np.ndarray | None = None, wind: Wind | None = None
+    ) -> np.ndarray:
         """Features (n, F) float32 at times (n,) [s]; the arguments are those of `BoundarySampler.vectors`."""
-        return self._sampler.vectors(times, strength=strength, joints=joints)[:, self._columns]
+        return self._sampler.vectors(times, strength=strength, joints=joints, wind=wind)[:, self._columns]
 
 
 def held_features(spec: BoundarySpec, relative: np.ndarray, gravity: np.ndarray) -> np.ndarray:

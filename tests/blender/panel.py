@@ -25,7 +25,8 @@ def drawn(icon: str = "") -> list[str]:
     from dcc_addon.operators.training import known_problem
 
     def draw(layout):
-        for cls in (*panels.CLASSES, *menu.CLASSES):
+        asked = (cls for cls in panels.CLASSES if getattr(cls, "poll", bool)(bpy.context))
+        for cls in (*asked, *menu.CLASSES):
             cls.draw(SimpleNamespace(layout=layout), bpy.context)
         menu.draw(SimpleNamespace(layout=layout), bpy.context)
 

@@ -12,12 +12,14 @@ from neuralocks_core.files import as_path
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel, cores
+from neuralocks_core.wind import check_felt
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
 from ..border.time_codes import given_cuts
 from ..shot.recorded import given_facts
 from ..shot.stage import StageGroom
+from ..shot.wind import as_wind, in_core, wind_facts
 from .model_notes import learned, model_notes
 from .posing import GroomPoser
 from .procedure import BakeResult, known_notes, read_asked, write_told
@@ -36,6 +38,8 @@ def bake(
     subframes: int = 1,
     material=None,
     strength: float = 1.0,
+    wind=None,
+    gusts: float | None = None,
     resolve: bool = True,
     loop: bool = False,
     cuts=None,
@@ -58,6 +62,8 @@ def bake(
         subframes: samples per frame, for motion blur.
         material: a Material, or words NAME=VALUE.
         strength: motion strength from 0 (each pose as if held) to 4; 1 is as trained.
+        wind: acceleration of all hair by a wind, three numbers in the stage's axes [m/s^2]; see `neuralocks_core.wind`.
+        gusts: share of it by which it varies, 0.5 if left out.
         resolve: push hair out of the body after the network.
         loop: the clip repeats, and its last sample shows the pose of its first: at the start, hair remembers the end of the clip.
         cuts: time codes at which a character is suddenly elsewhere and its hair starts anew; detected if None.
@@ -76,16 +82,18 @@ def bake(
     strand_model = model if isinstance(model, StrandModel) else StrandModel.load(model, threads=jobs)
     look = as_material(material)
     check_number("--strength", strength, 0, 4)
+    blown = as_wind(wind, gusts)
+    check_felt(blown is None or strand_model.feels_wind)
     cuts = given_cuts(cuts, loop)
     shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, progress)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
-    inputs = {"model": _digest(strand_model), "material": asdict(look)}
+    inputs = {"model": _digest(strand_model), "material": asdict(look), "wind": blown and asdict(blown)}
 
     def poser(items: list[StageGroom]) -> GroomPoser:
-        return GroomPoser(items, strand_model, look, **options)
+        return GroomPoser(items, strand_model, look, wind=in_core(blown, shot.border), **options)
 
     facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
-    facts |= given_facts(cuts, joints)
+    facts |= wind_facts(blown) | given_facts(cuts, joints)
     untrue = learned(strand_model, shot)
     known = known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins)
     notes = [

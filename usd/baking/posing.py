@@ -12,6 +12,7 @@ from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel, chunks
 from neuralocks_core.strands.strand_set import StrandSet
+from neuralocks_core.wind import Wind
 
 from ..shot.stage import StageGroom
 from .memory import LARGE, give_back, preparing
@@ -26,6 +27,7 @@ class GroomPoser:
         model: the strand model; its threads share the work, and the result does not depend on them.
         material: what the hair is made of.
         strength: motion strength; 0 is the held pose.
+        wind: in core axes.
         resolve: push hair out of the body after the network.
         loop: the clip repeats, its last sample shows the pose of its first.
     """
@@ -37,13 +39,14 @@ class GroomPoser:
         material: Material | None = None,
         *,
         strength: float = 1.0,
+        wind: Wind | None = None,
         resolve: bool = False,
         loop: bool = False,
     ):
         attachment, self._model = items[0].attachment, model
         character, self._rig = attachment.character, attachment.rig
         self._material = (material or Material()).log_ratios()
-        self._strength = strength
+        self._strength, self._wind = strength, wind
         self._sampler = model.sampler(character, replace(self._rig.clip, loop=True) if loop else self._rig.clip)
         self._resolvers: list[tuple[slice | np.ndarray, Resolver]] = []
         with preparing():  # or 150 MB of a large groom would stay allocated
@@ -115,4 +118,4 @@ class GroomPoser:
 
     def _vector(self, time_code: float, joints: np.ndarray) -> np.ndarray:
         seconds = self._rig.border.seconds([time_code])
-        return self._sampler.vectors(seconds, self._material, self._strength, joints[None])[0]
+        return self._sampler.vectors(seconds, self._material, self._strength, joints[None], self._wind)[0]

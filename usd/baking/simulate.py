@@ -22,6 +22,7 @@ from ..border.stage_files import check_layer_name
 from ..border.time_codes import given_cuts
 from ..shot.recorded import given_facts
 from ..shot.stage import StageGroom
+from ..shot.wind import as_wind, in_core, wind_facts
 from .bake import as_material
 from .placing import GroomPlacer
 from .procedure import BakeResult, known_notes, read_asked, write_told
@@ -44,6 +45,8 @@ def simulate(
     joints: dict[str, str] | None = None,
     subframes: int = 1,
     material=None,
+    wind=None,
+    gusts: float | None = None,
     strands: int | None = None,
     volume: float = 0.0,
     loop: bool = False,
@@ -54,7 +57,8 @@ def simulate(
     """Simulate a shot's hair and write it as a bake.
 
     Args:
-        shot, out, grooms, skeleton, head, frames, joints, subframes, material, loop, cuts, tell, progress: as for `bake`.
+        shot, out, grooms, skeleton, head, frames, joints, subframes, material, wind, gusts, loop, cuts, tell, progress: as
+            for `bake`.
         strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these and
             are pushed out of the body.
         volume: stiffness against strands crowding closer than in the groom [m^2/s^2]; models are trained without.
@@ -69,16 +73,18 @@ def simulate(
     count = STRANDS if strands is None else strands
     check_number("--strands", count, 1, whole=True)
     check_number("--volume", volume, 0, STIFFEST_VOLUME)
+    blown = as_wind(wind, gusts)
     cuts = given_cuts(cuts, loop)
     shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, progress)
     options = {"volume": float(volume), "loop": loop}
-    inputs = {"strands": count, "material": asdict(look), "codes": codes, **options}
+    inputs = {"strands": count, "material": asdict(look), "wind": blown and asdict(blown), "codes": codes, **options}
 
     def poser(items: list[StageGroom]) -> _SimulatedPoser:
-        return _SimulatedPoser(*items, codes, shot.first, look, count, **options, progress=progress)
+        how = {"wind": in_core(blown, shot.border), **options, "progress": progress}
+        return _SimulatedPoser(*items, codes, shot.first, look, count, **how)
 
     facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
-    facts |= given_facts(cuts, joints)
+    facts |= wind_facts(blown) | given_facts(cuts, joints)
     notes = known_notes(shot, codes, loop, loop or cuts is None)
     return write_told(notes, tell, began, shot, out, codes, poser, inputs, facts, progress=progress)
 
@@ -87,7 +93,7 @@ class _SimulatedPoser:
     """Points of one groom, from a simulation of some of its strands."""
 
     def __init__(
-        self, item: StageGroom, codes: list[float], first: float, material, count: int, *, volume, loop, progress
+        self, item: StageGroom, codes: list[float], first: float, material, count: int, *, wind, volume, loop, progress
     ):
         self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
         every = self._placer.strands
@@ -105,7 +111,7 @@ class _SimulatedPoser:
         self._skin = RootSkin(character, [every], clip)
         begun = self._skin.begun(every)
         self._moved = simulated(
-            character, begun.subset(chosen), clip, times, material, volume=volume, progress=progress
+            character, begun.subset(chosen), clip, times, material, wind=wind, volume=volume, progress=progress
         )
         mean = every.rest.mean(axis=1)
         self._chosen = chosen

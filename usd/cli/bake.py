@@ -12,6 +12,7 @@ from .options import (
     Cuts,
     Frames,
     Grooms,
+    Gusts,
     Head,
     Jobs,
     Joints,
@@ -21,8 +22,10 @@ from .options import (
     Out,
     Skeleton,
     Subframes,
+    WindVector,
     cut_codes,
     pairs,
+    vector,
 )
 
 
@@ -40,6 +43,8 @@ def bake_command(
     strength: Annotated[
         float, typer.Option(help="Motion strength from 0 (each pose as if held) to 4; 1 is as trained.")
     ] = 1.0,
+    wind: WindVector = None,
+    gusts: Gusts = None,
     resolve: Annotated[bool, typer.Option(help="Push hair out of the body after the network.")] = True,
     loop: Loop = False,
     cuts: Cuts = None,
@@ -60,7 +65,7 @@ def bake_command(
         result = bake(
             shot, out, model, groom or None, skeleton, head, frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
-            resolve=resolve, loop=loop, cuts=cut_codes(cuts), velocities=velocities,
+            wind=vector(wind, "--wind"), gusts=gusts, resolve=resolve, loop=loop, cuts=cut_codes(cuts), velocities=velocities,
             jobs=jobs, tell=note, progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)
@@ -97,6 +102,8 @@ def simulate_command(
     frames: Frames = None,
     subframes: Subframes = 1,
     material: Materials = None,
+    wind: WindVector = None,
+    gusts: Gusts = None,
     strands: Annotated[
         int | None, typer.Option(help="Simulate at most this many strands, 2000 if left out; the others follow them.")
     ] = None,
@@ -114,7 +121,8 @@ def simulate_command(
     with noting_when_cut_short(lambda: _how_to_go_on(out)), progress_bar("simulating") as progress:
         result = simulate(
             shot, out, groom or None, skeleton, head, frames,
-            joints=pairs(joint, "--joint"), subframes=subframes, material=material, strands=strands, volume=volume,
+            joints=pairs(joint, "--joint"), subframes=subframes, material=material,
+            wind=vector(wind, "--wind"), gusts=gusts, strands=strands, volume=volume,
             loop=loop, cuts=cut_codes(cuts), tell=note, progress=progress,
         )  # fmt: skip
     _bake_report(result, as_json)

@@ -35,6 +35,15 @@ Materials = Annotated[
         "damping 4..20 /s, clumping 0..240 /s^2.",
     ),
 ]
+WindVector = Annotated[
+    str | None,
+    typer.Option(
+        "--wind", help="X,Y,Z: how a wind accelerates all hair, in the stage's axes, at most 8 m/s^2 (try 2)."
+    ),
+]
+Gusts = Annotated[
+    float | None, typer.Option("--gusts", help="Share by which the wind varies, 0 (steady) to 1; 0.5 if left out.")
+]
 Loop = Annotated[bool, typer.Option("--loop", help="The clip repeats: its last sample shows the pose of its first.")]
 Cuts = Annotated[
     list[str] | None,
@@ -61,6 +70,17 @@ def cut_codes(given: list[str] | None) -> list[float] | None:
         return [plain_number(code) for code in text.split(",")]
     except ValueError:
         raise NeuralocksError(f"--cuts {text}: is not a list of frames; write for example 25,49, or none") from None
+
+
+def vector(text: str | None, option: str) -> tuple[float, ...] | None:
+    """Three numbers X,Y,Z, given to `option`; None if it was not given."""
+    if text is None:
+        return None
+    try:
+        x, y, z = (plain_number(part) for part in text.split(","))
+    except ValueError:
+        raise NeuralocksError(f"{option} {text}: is not X,Y,Z; write for example 2,0,0") from None
+    return x, y, z
 
 
 def pairs(words: list[str] | None, option: str) -> dict[str, str]:

@@ -10,7 +10,21 @@ from typing import Annotated
 import typer
 
 from .command import command_of, counted, note, print_json
-from .options import AsJson, Cuts, Head, Joints, Loop, Seed, Skeleton, Subframes, cut_codes, pairs
+from .options import (
+    AsJson,
+    Cuts,
+    Gusts,
+    Head,
+    Joints,
+    Loop,
+    Seed,
+    Skeleton,
+    Subframes,
+    WindVector,
+    cut_codes,
+    pairs,
+    vector,
+)
 from .progress import progress_bar
 
 app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -111,6 +125,8 @@ def bake(
     strength: Annotated[
         float, typer.Option(help="Motion strength of a dynamic model, from 0 to 2; 1 is as trained.")
     ] = 1.0,
+    wind: WindVector = None,
+    gusts: Gusts = None,
     cuts: Cuts = None,
     head: Head = None,
     skeleton: Skeleton = None,
@@ -134,6 +150,8 @@ def bake(
             subframes=subframes,
             loop=loop,
             strength=strength,
+            wind=vector(wind, "--wind"),
+            gusts=gusts,
             cuts=cut_codes(cuts),
             joints=pairs(joint, "--joint"),
             tell=note,

@@ -12,11 +12,17 @@ from neuralocks_core.measures import MEASURES
 from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND, K
 from neuralocks_core.runtime import graph_session
 from neuralocks_core.stepped import LONGEST
+from neuralocks_core.wind import ACROSS, FREQUENCIES, PHASES, SHARES
 
 from ..border.units import FASTEST, SLOWEST
 from ..skel.clip_codes import ALONE, CLOSE, SAME, STAND, STEP
 
 UNITS = "SI units, float32; canonical space: origin at the head joint, Y up, the bind pose faces +Z"
+
+
+def _listed(values) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
 
 GRAPHS = {
     "encoder.onnx": f"once per groom: `shape` (S, {SHAPE}), root-relative points of {K} vertices in scalp axes [m] "
@@ -61,6 +67,13 @@ _SPACES = "(3, 3), without scale: columns made of unit length, and the nearest r
 _PLACE = "the place of the head joint"
 _STRAND_PLACE = _PLACE + " (for hair carried by a joint below it: that of `canonical_to_head`'s origin)"
 
+_WIND = (
+    "add the binned steps of T(R_head(t_k)) w(t_k) / 9.81 to those of f_k, with w(t) the acceleration of hair by the wind [m/s^2, "
+    "world]; motion strength does not scale them. In a bake, w = m + gusts (a m + b s), with m the wind that it was given, s a "
+    f"level vector {ACROSS:g} times as long as m, towards (m.z, 0, -m.x), "
+    f"a and b the sums of c sin(2 pi f t + phase), c {_listed(SHARES)}, f {_listed(FREQUENCIES)} Hz, phases {_listed(PHASES[0])} and "
+    f"{_listed(PHASES[1])} rad; in a loop, f is rounded to whole turns"
+)
 STRAND_INPUT = {
     "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(its `bind`) * inverse(`facing`), " + _SPACES,
     "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j; stance is 1 except for upper arms",
@@ -93,6 +106,7 @@ SLIDERS = {
     + ", motion strength from 0 to 4. They change `material` in the boundary vectors and in `held`; if the model is anchored, then compute "
     "`anchor` again, once: `offsets` of tail.onnx with `anchor` zero and the frame `held`",
     "motion strength": "a factor of `history`: 0 is each pose as if held, 1 as trained",
+    "wind": _WIND,
     "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
     f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
@@ -123,12 +137,14 @@ def described(file: model_file.ModelFile) -> dict:
             "pose joints": spec.pose_joints,
             "shape": MEASURES,
         }
-        result["sliders"] = SLIDERS
+        result["sliders"] = {name: how for name, how in SLIDERS.items() if name != "wind" or spec.feels_wind}
     else:
         result["features"] = _input(spec, ["pose", "gravity", "history"], RIG_INPUT, _PLACE)
         result["features"]["how"]["history"] += (
             ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained"
         )
+        if spec.feels_wind:
+            result["features"]["how"]["wind"] = _WIND
     meta = {name: value for name, value in file.meta.items() if name != "layers"}  # the weights, which rig.onnx has
     return result | {"model": meta | {"training": training}}
 

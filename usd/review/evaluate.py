@@ -28,6 +28,7 @@ from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, strands_on
 from ..border.damage import names_damage
 from ..shot.recorded import recorded, recorded_material, recorded_volume
 from ..shot.stage import StageGroom
+from ..shot.wind import recorded_wind
 from .baked import Baked, read_baked
 from .own_bends import OwnBends
 
@@ -276,8 +277,9 @@ class _Subject:
         if not clip.loop:
             begun = max(min(times[0], clip.start), begun)
         known = np.concatenate([[begun], times])
-        volume = recorded_volume(self.item.prim)
-        true = comparison.simulated(self.character, some, clip, known, material, volume=volume, progress=self.say)[1:]
+        rig, prim = self.item.attachment.rig, self.item.prim
+        felt = {"wind": recorded_wind(prim, rig.border), "volume": recorded_volume(prim)}
+        true = comparison.simulated(self.character, some, clip, known, material, **felt, progress=self.say)[1:]
         answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
         answers["rigid"] = np.zeros_like(true)
         rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}

@@ -12,6 +12,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 from neuralocks_core.rig.network import RigModel
 from neuralocks_core.shortcomings import shortcomings
+from neuralocks_core.wind import check_felt
 
 from ..border.amounts import check_number
 from ..border.damage import names_damage
@@ -20,6 +21,7 @@ from ..border.stopping import check
 from ..border.time_codes import given_cuts
 from ..shot.notes import asked_notes, left_out, out_of_place
 from ..shot.stage import check_cuts
+from ..shot.wind import as_wind, in_core
 from .bound import BoundHair
 from .layer import MovedHair, write_rig_layer
 from .stage import of_skeleton, read_rigged_hairs
@@ -69,6 +71,8 @@ def bake_rig(
     subframes: int = 1,
     loop: bool = False,
     strength: float = 1.0,
+    wind=None,
+    gusts: float | None = None,
     cuts=None,
     joints: dict[str, str] | None = None,
     tell: Callable[[list[str]], None] | None = None,
@@ -88,6 +92,7 @@ def bake_rig(
         subframes: samples per frame.
         loop: the clip repeats, and its last sample shows the pose of its first.
         strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
+        wind, gusts: as for `baking.bake.bake`; a dynamic model feels them.
         cuts: time codes at which a character is suddenly elsewhere and its hair starts anew; detected if None.
         joints: semantic joint -> joint (path, or its last part), if names are not enough.
         tell: called with the notes known before hair is turned, then with the others.
@@ -100,6 +105,8 @@ def bake_rig(
     check_layer_name(out)
     check_number("--strength", strength, 0, 2)
     model = model if isinstance(model, RigModel) else RigModel.load(model)
+    blown = as_wind(wind, gusts)
+    check_felt(blown is None or model.feels_wind)
     cuts = given_cuts(cuts, loop)
     found, left = read_rigged_hairs(
         shot, skeleton=skeleton, head=head, joints=joints, cuts=cuts, unbaked=True, model=model.chains
@@ -122,7 +129,7 @@ def bake_rig(
     counter = _Counter(sum(len(one.codes) for one in bound), progress)
 
     def moved(one: BoundHair) -> MovedHair:
-        turns, held = one.turns(loop, strength, counter)
+        turns, held = one.turns(loop, strength, in_core(blown, one.hair.border), counter)
         said.extend(held + one.hair.source.notes)  # also on poses between those of the clip
         return MovedHair(one.hair, one.codes, turns)
 

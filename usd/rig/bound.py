@@ -11,6 +11,7 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.carried import CarriedHair
 from neuralocks_core.rig.network import RigModel
+from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
 from ..shot.notes import on_twos, without_turn
@@ -69,11 +70,14 @@ class BoundHair:
         """Indices of the hair joints in the skeleton, (N,)."""
         return self.hair.rig.chains.joints
 
-    def turns(self, loop: bool, strength: float, say: Callable[[], None]) -> tuple[np.ndarray, list[str]]:
+    def turns(
+        self, loop: bool, strength: float, wind: Wind | None, say: Callable[[], None]
+    ) -> tuple[np.ndarray, list[str]]:
         """Turns of the hair joints (T, N, 4) wxyz in their own bind axes as authored, and notes on them.
 
         Args:
             loop, strength: see `bake.bake_rig`.
+            wind: in core axes.
             say: called after each.
 
         Raises:
@@ -88,10 +92,10 @@ class BoundHair:
             second = self.hair.border.seconds([code])
             wrapped = clip.loop and not clip.start <= second[0] <= clip.end
             shown = clip.at(second) if wrapped else source.joints_at(code)[None]
-            turns[row] = carried.turns(second, strength, shown)[0]
+            turns[row] = carried.turns(second, strength, shown, wind)[0]
             say()
         turns = source.authored_turns(self.joints, chains.turns_on(self.hair.rig.chains, turns))
-        return turns, self._held(carried.carriers, turns)
+        return turns, self._held(carried.carriers, turns, wind)
 
     def notes(self, loop: bool, find_cuts: bool) -> list[str]:
         """What a user should know before hair is turned."""
@@ -107,14 +111,16 @@ class BoundHair:
             *(rig.cut_notes(loop) if (loop or find_cuts) and self.model.dynamic else []),
         ]
 
-    def _held(self, carriers: np.ndarray, turns: np.ndarray) -> list[str]:
-        """The note on a head that is held still, with all other joints that carry hair; raises as `turns`."""
+    def _held(self, carriers: np.ndarray, turns: np.ndarray, wind: Wind | None) -> list[str]:
+        """The note on a head that is held still, with all other joints that carry hair, in a calm; raises as `turns`."""
         rig = self.hair.source
         source, character, joints = rig.source, rig.character, rig.clip.joints
         if np.ptp(joints[:, carriers], axis=0).max() >= 1e-7:
             return []
         if source.ignored:
             raise NeuralocksError(source.ignored)
+        if wind:
+            return []
         name = leaf(character.skeleton.names[character.head])
         turned = np.abs((joints[0, carriers] @ character.inverse_bind[carriers])[:, :3, :3] - np.eye(3)).max()
         if min(turned, np.abs(turns[..., 1:]).max()) < STILL:

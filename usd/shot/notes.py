@@ -119,7 +119,7 @@ def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
     head of an unlikely size.
     """
     held = rig.source.animated and len(rig.time_codes) == 1
-    notes = [f"{rig.path}: the animation has one sample, so the hair is that of a held pose"] if held else []
+    notes = [f"{rig.path}: the animation has one sample, so the body holds one pose"] if held else []
     return notes + on_twos(rig, joints) + unfound(rig, joints) + unlikely_head(rig)
 
 

@@ -3,7 +3,7 @@
 
 import math
 
-from pxr import Sdf, Usd, Vt
+from pxr import Gf, Sdf, Usd, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
@@ -20,13 +20,15 @@ def record(over: Sdf.PrimSpec, facts: dict) -> None:
 
 
 def recorded(prim: Usd.Prim) -> dict:
-    """What `record` wrote, with time codes as a list in the stage's time; empty if there is no record."""
+    """What `record` wrote, with time codes, in the stage's time, and vectors as lists; empty if there is no record."""
     facts, offset, _ = _strongest(prim)
     if not isinstance(facts, dict):
         return {}
 
     def as_stage_has_it(value):
-        return [round(offset * code, 9) for code in value] if isinstance(value, Vt.DoubleArray) else value
+        if isinstance(value, Vt.DoubleArray):
+            return [round(offset * code, 9) for code in value]
+        return list(value) if isinstance(value, Gf.Vec3d) else value
 
     return {name: as_stage_has_it(value) for name, value in facts.items()}
 

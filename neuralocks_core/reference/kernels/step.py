@@ -58,6 +58,7 @@ def forces(
     neighbours: wp.array2d(dtype=wp.int32),
     turn: wp.quatd,
     gravity: wp.vec3d,
+    wind: wp.vec3d,
     carry: wp.quatd,
     carry_origin: wp.vec3d,
     inverse_dt: wp.float64,
@@ -84,7 +85,7 @@ def forces(
             # (2 last - before), and the head's own motion, both from the last position
             sum = stiff * (old + (old - before[k, s])) + drag * (wp.quat_rotate(carry, old) + carry_origin)
             stiff = stiff + drag
-        sum = sum + weight[s] * gravity
+        sum = sum + weight[s] * gravity + wind
         count = wp.float64(0.0)
         meet = wp.vec3d()
         for j in range(neighbours.shape[0]):

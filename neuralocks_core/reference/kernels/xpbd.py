@@ -131,6 +131,7 @@ def frame(
     turns: wp.array(dtype=wp.quat),
     moves: wp.array(dtype=wp.vec3),
     gravity: wp.vec3,
+    wind: wp.vec3,
     h: float,
     plane: wp.array2d(dtype=wp.vec4),
     margin: array_real,
@@ -161,7 +162,7 @@ def frame(
             else:
                 along = (wp.quat_rotate(carry, p) - p + move) / h
                 v = along + keep * (velocity[k, s] - along)
-                v = v + h * weight[s] * (gravity + wp.quat_rotate(turn, push[k, s]))
+                v = v + h * (wind + weight[s] * (gravity + wp.quat_rotate(turn, push[k, s])))
                 x[k, s] = old[k, s] + h * v
         q = turn
         edge = wp.normalize(x[1, s] - x[0, s])

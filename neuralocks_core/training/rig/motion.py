@@ -21,20 +21,21 @@ from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rotation import from_quaternion
 from neuralocks_core.training.rig.body import body_around, posed_distances, rest_distances
 from neuralocks_core.training.rig.report import depths, hair_points, no_turns
+from neuralocks_core.wind import Wind
 
 RATE = 30.0
 """Samples of the simulations [Hz]."""
 SPRINGS, DEFAULTS = "spring bones, best of 12 settings", "spring bones, VRM's defaults"
 
 
-def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions):
+def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions, wind: Wind | None = None):
     """Features (C, T, F) and simulated turns (C, T, N, 4) of clips of equal length, sampled at RATE."""
     times = np.arange(int(round((motions[0].end - motions[0].start) * RATE)) + 1) / RATE + motions[0].start
     heads, features, bodies = [], [], []
     for motion in motions:
         joints = motion.at(times)
         heads.append(rig.character.canonical_to_world(joints))
-        features.append(RigSampler(spec, rig.character, motion).features(times))
+        features.append(RigSampler(spec, rig.character, motion).features(times, wind=wind))
         bodies.append(body_around(rig, joints))
     body = None
     if bodies[0] is not None:
@@ -42,7 +43,7 @@ def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions):
         body = BodyPoints(np.stack([b[0] for b in bodies]), np.stack([b[1] for b in bodies]), rest[0][0], rest[1][0])
     contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, material.margin) if len(rig.points) else None
     solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping, material.weight, contacts)
-    return np.stack(features), solver.simulate(np.stack(heads), 1 / RATE, body)
+    return np.stack(features), solver.simulate(np.stack(heads), 1 / RATE, body, wind and wind.at(times))
 
 
 def motion_report(

@@ -8,6 +8,7 @@ from neuralocks_core.motion import Clip
 from neuralocks_core.rig import RigSampler, rig_spec
 from neuralocks_core.rig.export_c import HISTORY_BYTES, export_c
 from neuralocks_core.rotation import from_vector, to_quaternion
+from neuralocks_core.wind import Wind
 from tests.core.rig.builders import character, random_model
 from tests.core.rig.c_programs import COMPILERS, compiled, run_c
 
@@ -63,6 +64,27 @@ def test_of_a_head_that_turns_accelerations_are_felt_in_the_axes_of_a_bake(tmp_p
     felt, asked = (values.reshape(len(t), -1, 2, 3)[t > 2][:, :, 0] for values in (ours, wanted))
     error = np.sqrt(np.square(felt - asked).mean() / np.square(asked).mean())
     assert error < 3.5 / rate + 0.02, error
+
+
+@pytest.mark.parametrize("rate", [30, 60, 144])
+def test_a_wind_is_felt_as_in_a_bake(tmp_path, rate):
+    """The history's direction of gravity is gravity and wind, as the header says; that of the input stays gravity's."""
+    model = random_model(spec=rig_spec(True))
+    export_c(model, tmp_path / "hair.h")
+    who, t, wind = character(), np.arange(0, 4, 1 / rate), Wind((3.0, 1.0, -6.0), 1.0)
+    joints = np.tile(who.skeleton.bind, (len(t), 1, 1, 1))
+    joints[:, who.head, :3, :3] = from_vector(np.outer(0.6 * np.sin(4 * t), [0.5, 1, 0]))
+    wanted = RigSampler(model.spec, who, Clip(t, joints)).features(t, wind=wind)[:, 15:]
+    quaternions = to_quaternion(joints[:, who.head, :3, :3])
+    down = wind.at(t) / 9.81 - [0, 1, 0]
+    rows = np.concatenate([t[:, None], joints[:, who.head, :3, 3], quaternions, down], axis=1)
+    harness = HISTORY_HARNESS.replace("row[8]", "row[11]").replace(
+        "    nl_hair_history_push",
+        "    history.down[0] = row[8], history.down[1] = row[9], history.down[2] = row[10];\n    nl_hair_history_push",
+    )
+    ours = run_c(compiled(tmp_path, harness), rows, wanted.shape[1])
+    error = np.sqrt(np.square(ours - wanted)[t > 2].mean() / np.square(wanted[t > 2]).mean())
+    assert error < 0.03, error
 
 
 @pytest.mark.parametrize(

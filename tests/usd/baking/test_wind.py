@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bakes in a wind: in the stage's axes, recorded, and the same by every way."""
+
+import json
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf
+
+from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.errors import NeuralocksError
+from tests.strand_models import write_random_model
+from usd.baking.bake import bake
+from usd.baking.join import join
+from usd.baking.simulate import simulate
+from usd.review.evaluate import evaluate
+from usd.review.inspect import inspect
+from usd.rig.bake import bake_rig
+from usd.rig.stage import read_rigged_hair
+from usd.shot.recorded import KEY
+
+from ..commands import status
+from ..rig_shots import hair_turns, model_for, small_shot
+from ..shots import HAIR, Recipe, samples, world_points, write_loop, write_shot
+
+
+def test_wind_is_given_in_the_axes_of_the_stage(tmp_path, model):
+    """Towards -Y and up of a stage in centimetres with Z up is towards +Z and up with Y up."""
+    one = write_shot(tmp_path, Recipe(), "metres")
+    other = write_shot(tmp_path, Recipe(unit=0.01, up="Z"), "centimetres")
+    bake(one, tmp_path / "one.usdc", model, wind=(2, 4, 6))
+    bake(other, tmp_path / "other.usdc", model, wind=(2, -6, 4))
+    for code in (1.0, 5.0, 9.0):
+        assert world_points(tmp_path / "one.usdc", code) == pytest.approx(
+            world_points(tmp_path / "other.usdc", code), abs=2e-5
+        )
+    calm = bake(one, tmp_path / "calm.usdc", model).path
+    assert np.abs(world_points(calm, 5.0) - world_points(tmp_path / "one.usdc", 5.0)).max() > 5e-4
+
+
+def test_a_frame_does_not_depend_on_the_others_and_parts_make_the_whole(tmp_path, model):
+    shot = write_shot(tmp_path)
+    whole = bake(shot, tmp_path / "whole.usdc", model, wind=(0, 0, -4), gusts=1).path
+    parts = [
+        bake(shot, tmp_path / f"{frames[0]}.usdc", model, frames=frames, wind=(0, 0, -4), gusts=1, jobs=1).path
+        for frames in ("1:4", "5:9")
+    ]
+    joined = join(parts, tmp_path / "joined.usdc").path
+    assert joined.read_bytes() == whole.read_bytes()
+    calm = bake(shot, tmp_path / "calm.usdc", model, frames="5:9").path
+    with pytest.raises(NeuralocksError, match="wind"):
+        join([parts[0], calm], tmp_path / "mixed.usdc")
+
+
+def test_the_command_bakes_what_the_call_bakes(tmp_path, model, capsys):
+    shot = write_shot(tmp_path)
+    words = ["bake", shot, "-o", tmp_path / "told.usdc", "--model", model, "--wind", "-2,0,1.5", "--gusts", "0.3"]
+    assert status(*words) == 0
+    called = bake(shot, tmp_path / "called.usdc", model, wind=(-2, 0, 1.5), gusts=0.3).path
+    assert samples(called, "points", at=7.0).tobytes() == samples(tmp_path / "told.usdc", "points", at=7.0).tobytes()
+    for wrong, said in (
+        (["--wind", "2,0"], "--wind 2,0: is not X,Y,Z; write for example 2,0,0"),
+        (["--wind", "2,0,x"], "--wind 2,0,x: is not X,Y,Z"),
+        (["--wind", "9,0,0"], "wind: is 9 m/s^2 strong; give at most 8"),
+        (["--wind", "nan,0,0"], "wind: (nan, 0.0, 0.0) is not a vector"),
+        (["--gusts", "0.5"], "--gusts 0.5: there is no wind that could vary; give --wind X,Y,Z, too"),
+        (["--wind", "1,0,0", "--gusts", "2"], "gusts 2.0: give a share"),
+    ):
+        capsys.readouterr()
+        assert status("bake", shot, "-o", tmp_path / "no.usdc", "--model", model, *wrong) == 1
+        assert said in capsys.readouterr().err
+    assert not (tmp_path / "no.usdc").exists()
+
+
+def test_a_calm_is_a_bake_without_wind(tmp_path, model):
+    shot = write_shot(tmp_path)
+    for name, given in (("none", {}), ("calm", {"wind": (0, 0, 0)})):
+        bake(shot, tmp_path / f"{name}.usda", model, **given)
+    assert (tmp_path / "none.usda").read_bytes() == (tmp_path / "calm.usda").read_bytes()
+
+
+@pytest.mark.parametrize("wrong", ["2,0,0", (1, 2), (1, 2, "3"), {"x": 1}, 2.0])
+def test_what_is_no_wind_is_refused(tmp_path, model, wrong):
+    with pytest.raises(NeuralocksError, match="wind: .* is not one; give three numbers"):
+        bake(write_shot(tmp_path), tmp_path / "out.usdc", model, wind=wrong)
+
+
+def test_a_bake_records_its_wind_and_a_report_compares_with_the_same(tmp_path):
+    """A simulation in a wind, measured against the reference, is the reference; measured in a calm, it is not."""
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    shot = write_shot(tmp_path, Recipe(unit=0.01, up="Z", strands=10, bound="mesh", frames=24))
+    out = simulate(shot, tmp_path / "blown.usda", strands=10, wind=(0, -5, 2), gusts=0.8).path
+    told = next(each for each in inspect(out)["grooms"] if each["path"] == HAIR)["baked with"]
+    assert tuple(told["wind"]) == (0, -5, 2) and told["gusts"] == pytest.approx(0.8)
+    assert evaluate(out, reference=True).compared[HAIR]["bake"]["position_percent"] < 0.1
+    layer = Sdf.Layer.FindOrOpen(str(out))
+    facts = dict(layer.GetPrimAtPath(HAIR).customData[KEY])
+    del facts["wind"], facts["gusts"]
+    layer.GetPrimAtPath(HAIR).SetInfo("customData", {KEY: facts})
+    layer.Save()
+    assert evaluate(out, reference=True).compared[HAIR]["bake"]["position_percent"] > 3
+    layer.GetPrimAtPath(HAIR).SetInfo("customData", {KEY: facts | {"wind": Gf.Vec3d(99, 0, 0)}})
+    layer.Save()
+    with pytest.raises(NeuralocksError, match="records a wind that cannot be read .*strong.*; bake again"):
+        evaluate(out, reference=True)
+
+
+def test_a_loop_ends_in_the_wind_that_it_begins_in(tmp_path, model):
+    shot = write_loop(tmp_path)
+    out = bake(shot, tmp_path / "loop.usdc", model, wind=(3, 0, 0), gusts=1, loop=True).path
+    codes = sorted(Sdf.Layer.FindOrOpen(str(out)).ListTimeSamplesForPath(f"{HAIR}.points"))
+    first, second, last = (world_points(out, code) for code in (codes[0], codes[1], codes[-1]))
+    assert last == pytest.approx(first, abs=1e-5)
+    assert np.abs(second - first).max() > 1e-4
+
+
+def test_hair_that_feels_no_wind_refuses_it(tmp_path):
+    still = write_random_model(tmp_path / "held.neuralocks", gain=1.0, spec=BoundarySpec(bins=()))
+    with pytest.raises(NeuralocksError, match="wind: this model is for held poses"):
+        bake(write_shot(tmp_path), tmp_path / "out.usdc", still, wind=(1, 0, 0))
+    assert not (tmp_path / "out.usdc").exists()
+
+
+def test_wind_moves_bones_in_the_axes_of_the_stage(tmp_path, capsys):
+    """And neither the body nor a network for held poses."""
+    one, other = small_shot(tmp_path / "one.usda"), small_shot(tmp_path / "other.usda", scale=100.0, z_up=True)
+    model = model_for(read_rigged_hair(one), dynamic=True)
+    path = model.save(tmp_path / "rig.neuralocks")
+    codes = [1.0, 9.0, 17.0]
+    bake_rig(one, tmp_path / "a.usda", model, wind=(3, 0, 6))
+    bake_rig(other, tmp_path / "b.usda", model, wind=(3, -6, 0))
+    bake_rig(one, tmp_path / "calm.usda", model)
+    blown, calm = (hair_turns(tmp_path / f"{name}.usda", codes) for name in ("a", "calm"))
+    assert hair_turns(tmp_path / "b.usda", codes) == pytest.approx(blown, abs=2e-3)
+    assert np.abs(blown - calm).max() > 1e-2
+    words = ["rig", "bake", one, "-o", tmp_path / "told.usda", "--model", path, "--wind", "3,0,6", "--json"]
+    assert status(*words) == 0 and json.loads(capsys.readouterr().out)
+    assert hair_turns(tmp_path / "told.usda", codes).tolist() == blown.tolist()
+    with pytest.raises(NeuralocksError, match="wind: this model is for held poses"):
+        bake_rig(one, tmp_path / "no.usda", model_for(read_rigged_hair(one)), wind=(1, 0, 0))
+    assert not (tmp_path / "no.usda").exists()
+
+
+def test_wind_moves_the_hair_of_a_head_that_is_held_still(tmp_path):
+    shot = small_shot(tmp_path / "still.usda", head_moves=False)
+    model = model_for(read_rigged_hair(shot), dynamic=True)
+    with pytest.raises(NeuralocksError, match="is not animated, so the hair would not move"):
+        bake_rig(shot, tmp_path / "calm.usda", model)
+    notes = bake_rig(shot, tmp_path / "blown.usda", model, wind=(0, 0, -5), gusts=1).notes
+    assert not any("held pose" in note for note in notes)
+    assert np.abs(np.diff(hair_turns(tmp_path / "blown.usda", [1.0, 9.0, 17.0]), axis=0)).max() > 1e-3
