@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.groom import Groom
+from neuralocks_core.hairstyles.fitting import sphere
 
 SHOT = Path(__file__).resolve().parents[1] / "examples/shot/shot.usda"
 COLUMNS = {
@@ -129,19 +130,6 @@ def on_head(paths, character, scalp: np.ndarray) -> dict[Path, Groom]:
             points = (points @ to_bind[:3, :3].T + to_bind[:3, 3]).astype(np.float32)
             result[path] = replace(groom, points=points, widths=np.float32([8e-5]))
     return {path: result[path] for path in map(Path, paths)}
-
-
-def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre and radius of the sphere nearest to points (n, 3), in least squares; outliers, such as a tail's hair tie, are left
-    out.
-    """
-    used = points
-    for _ in range(4):
-        design = np.concatenate([2 * used, np.ones((len(used), 1))], axis=1)
-        x = np.linalg.lstsq(design, np.square(used).sum(1), rcond=None)[0]
-        centre, radius = x[:3], float(np.sqrt(x[3] + np.square(x[:3]).sum()))
-        used = points[np.abs(np.linalg.norm(points - centre, axis=1) - radius) < 0.2 * radius]
-    return centre, radius
 
 
 def roots(groom: Groom) -> np.ndarray:

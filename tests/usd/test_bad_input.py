@@ -9,7 +9,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
-from usd.assets.groom import import_groom
+from usd.assets.importing import import_groom
 from usd.baking.bake import bake
 from usd.baking.join import join
 from usd.baking.spool import Spool

@@ -8,8 +8,8 @@ from pxr import Sdf
 
 from neuralocks_core.errors import NeuralocksError
 from usd.assets.body import write_body
-from usd.assets.groom import import_groom
 from usd.assets.grow import grow
+from usd.assets.importing import import_groom
 from usd.baking.bake import bake
 from usd.models.export import export_model
 from usd.review.demo import demo

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write grooms as USD BasisCurves with the attributes that other tools read, and import them from any file."""
+"""Write grooms as USD BasisCurves with the attributes that other tools read."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,24 +7,18 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, Vt
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
-from neuralocks_core.formats.look import Look
-from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.strand_set import root_uv
 
+from ..baking.header import write_header
 from ..border.arrays import floats, integers, row_matrix
-from ..border.damage import names_damage
-from ..border.placement import Placement
-from ..border.stage_files import LAYERS, OTHERS, check_not_input, open_stage, write_stage
+from ..border.stage_files import write_stage
 from ..border.units import Border
-from ..shot.curves import find_curves, read_groom
-from ..shot.notes import few
-from .beside import Beside, Primvar, read_beside
+from ..skel.stage_rig import StageRig
+from .beside import Beside
 from .prims import POLYLINES, Spline, author_curves
 
-USD = (*LAYERS, ".usdz")
 BELOW = 0.02
 """The middle of a head is at least this far below the lowest root [m]."""
 
@@ -44,45 +38,42 @@ class Authored:
     beside: Beside = Beside()
 
 
-def import_groom(source, out, unit: str | float | None = None, up: str | None = None) -> tuple[list[Groom], list[str]]:
-    """Read a hair file (TressFX, .hair, .data, .bin, USD curves) and write it as a USD groom in metres, Y up.
+@dataclass(frozen=True)
+class Over:
+    """A file that grooms are written over, so that the new file shows both.
 
-    Args:
-        source: the hair file.
-        out: USD file to write.
-        unit: "mm", "cm", "in", "m" or metres per unit of the source; if left out, what the file says, or what suits a head.
-        up: "Y" or "Z", the source's upward axis.
-
-    Returns:
-        The grooms, and what a user should know.
-
-    Raises:
-        NeuralocksError: the source cannot be read or the target cannot be written.
+    Attributes:
+        rig: the character with the hair.
+        path: its file.
     """
-    source, out = as_path(source, "source"), as_path(out, "out")
-    if source.suffix.lower() in (*USD, *OTHERS):
-        found, notes = _read_usd(source, out, unit, up)
-    else:
-        from neuralocks_core import formats
 
-        groom, look, notes = formats.read_with_look(source, unit, up)
-        found = [Authored(groom, beside=Beside(_primvars(look)))]
-    write_grooms(out, found)
-    return [each.groom for each in found], notes
+    rig: StageRig
+    path: Path
+
+    @property
+    def stage(self) -> Usd.Stage:
+        """The file's."""
+        return self.rig.source.prim.GetStage()
+
+    def finish(self, layer: Sdf.Layer, out: Path) -> None:
+        """Make a layer, to be found at `out`, one over the file."""
+        codes = self.rig.time_codes[[0, -1]].tolist()
+        write_header(layer, self.stage, self.rig.border, self.path, out, codes)
 
 
-def write_groom(path, groom: Groom, border: Border | None = None) -> Path:
+def write_groom(path, groom: Groom, border: Border | None = None, over: Over | None = None) -> Path:
     """Write one groom; see `write_grooms`."""
-    return write_grooms(path, [Authored(groom)], border)
+    return write_grooms(path, [Authored(groom)], border, over)
 
 
-def write_grooms(path, grooms: list[Authored], border: Border | None = None) -> Path:
+def write_grooms(path, grooms: list[Authored], border: Border | None = None, over: Over | None = None) -> Path:
     """Write grooms below one root prim `/Groom`; the file is complete once it has its final name.
 
     Args:
         path: USD file to write.
         grooms: in metres, Y up.
         border: of the stage that the grooms are made for, whose unit and axis the file uses; metres and Y up if left out.
+        over: write a layer over this file.
 
     Raises:
         NeuralocksError: the path has another extension or cannot be written.
@@ -91,15 +82,18 @@ def write_grooms(path, grooms: list[Authored], border: Border | None = None) -> 
     def author(stage: Usd.Stage) -> None:
         UsdGeom.SetStageUpAxis(stage, border.up_axis if border else UsdGeom.Tokens.y)
         UsdGeom.SetStageMetersPerUnit(stage, border.metres_per_unit if border else 1.0)
-        root = UsdGeom.Xform.Define(stage, "/Groom")
+        root = UsdGeom.Xform.Define(stage, _free_path(over.stage if over else stage, Sdf.Path("/"), "Groom"))
         if border and not np.array_equal(border.from_core, np.eye(4)):
             root.AddTransformOp().Set(row_matrix(border.from_core))
         Usd.ModelAPI(root).SetKind("component")
         stage.SetDefaultPrim(root.GetPrim())
         for each in grooms:
-            each.beside.author(author_groom(stage, _free_path(stage, each.groom.name), each.groom, each.spline))
+            each.beside.author(
+                author_groom(stage, _free_path(stage, root.GetPath(), each.groom.name), each.groom, each.spline)
+            )
 
-    return write_stage(as_path(path, "path"), author)
+    path = as_path(path, "path")
+    return write_stage(path, author, (lambda layer: over.finish(layer, path)) if over else None)
 
 
 def author_groom(stage: Usd.Stage, path, groom: Groom, spline: Spline = POLYLINES) -> UsdGeom.BasisCurves:
@@ -146,42 +140,11 @@ def _guessed_uv(groom: Groom) -> np.ndarray:
     return root_uv(roots, centre)
 
 
-def _primvars(look: Look) -> tuple[Primvar, ...]:
-    """Colours as primvars that renderers and viewports know."""
-    names, found = Sdf.ValueTypeNames, []
-    for name, kind, values, array in (
-        ("displayColor", names.Color3fArray, look.color, Vt.Vec3fArray),
-        ("displayOpacity", names.FloatArray, look.opacity, Vt.FloatArray),
-    ):
-        if values is not None:
-            scope = UsdGeom.Tokens.constant if len(values) == 1 else UsdGeom.Tokens.vertex
-            found.append(Primvar(name, kind, scope, 1, array.FromNumpy(np.ascontiguousarray(values))))
-    return tuple(found)
-
-
-@names_damage
-def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
-    stage = open_stage(source)
-    check_not_input(out, stage)
-    border = Border.of(stage)
-    metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
-    border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
-    found, notes, left = [], [], []
-    for prim in find_curves(stage):
-        curves = UsdGeom.BasisCurves(prim)
-        groom = read_groom(prim, border.to_core @ Placement(prim).reference, notes)
-        tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
-        found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left)))
-    if not found:
-        raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
-    return found, notes + few(left, "primvars and materials are not imported like that")
-
-
-def _free_path(stage: Usd.Stage, name: str) -> str:
-    """An unused prim path below /Groom for a groom's name, which may be a file or a prim path."""
+def _free_path(stage: Usd.Stage, above: Sdf.Path, name: str) -> Sdf.Path:
+    """An unused path of a prim for a name, which may be a file or a prim path."""
     base = Tf.MakeValidIdentifier(Path(name.rsplit("/", 1)[-1]).stem or "Hair")
-    path, number = f"/Groom/{base}", 1
+    path, number = above.AppendChild(base), 1
     while stage.GetPrimAtPath(path):
         number += 1
-        path = f"/Groom/{base}_{number}"
+        path = above.AppendChild(f"{base}_{number}")
     return path

@@ -1,25 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks grow`: hairstyles of the procedural library on any character."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
 from neuralocks_core.hairstyles import grow as grow_style
+from neuralocks_core.hairstyles.fitting import Fitted, fit
 from neuralocks_core.progress import Progress, silent, within
 
-from ..border.stage_files import check_layer_name, check_not_input
+from ..border.stage_files import check_layer_name, check_not_over
 from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
-from .groom import write_groom
+from .groom import Over, write_groom
 
 _SEEN, _GROWN = 120, 930
 """Progress, in thousandths of the work for many strands, once the head is read and once the hair is grown."""
@@ -35,6 +37,7 @@ def grow(
     variation: int = 0,
     skeleton: str | None = None,
     head: str | None = None,
+    with_character: bool = False,
     tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> Path:
@@ -48,6 +51,7 @@ def grow(
         seed: the same seed gives the same groom.
         variation: number of a variation of the style, cut, parted, waved and laid differently; 0 is the style itself.
         skeleton, head: as for `bake`.
+        with_character: write a layer over the character's file, which can be opened and baked as it is.
         tell: called with notes for the user.
         progress: called with (done, total, message).
 
@@ -58,7 +62,7 @@ def grow(
     check_layer_name(out)
     rigs = read_rigs(character, skeleton, head)
     rig = rigs[0]
-    check_not_input(out, rig.source.prim.GetStage())
+    check_not_over(out, rig.source.prim.GetStage())
     check_writable(out)
     if tell:
         tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
@@ -66,11 +70,11 @@ def grow(
     say(0, 1000, "looking at the head")
     groom = Barber(rig.character).grow(style, count, seed, variation, within(say, _SEEN, _GROWN))
     say(_GROWN, 1000, f"writing {out.name}")
-    return write_groom(out, groom, rig.border)
+    return write_groom(out, groom, rig.border, Over(rig, as_path(character, "character")) if with_character else None)
 
 
 class Barber:
-    """Grows styles on one character; the head is read only once."""
+    """Grows styles on one character, or puts others' hair on it; the head is read only once."""
 
     def __init__(self, character: Character):
         if character.body is None:
@@ -81,6 +85,14 @@ class Barber:
         """A groom in bind-world metres."""
         groom = grow_style(style, self._scalp, count, seed, self._obstacle, variation, progress)
         return replace(groom, points=(groom.points @ self.character.facing).astype(np.float32))
+
+    def fitted(self, grooms: Sequence[Groom], resize: bool) -> Fitted:
+        """Grooms that were made for another head, on this one, in bind-world metres; see `fitting.fit`."""
+        triangles = self.character.body.triangles
+        skin = Collider(self._scalp.points, triangles[self.character.skin[triangles[:, 0]]])
+        found = fit(grooms, self._scalp, skin, resize)
+        turned = [replace(g, points=(g.points @ self.character.facing).astype(np.float32)) for g in found.grooms]
+        return replace(found, grooms=turned)
 
     @cached_property
     def _scalp(self) -> Scalp:

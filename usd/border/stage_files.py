@@ -15,6 +15,7 @@ from .damage import first_line, named
 from .stopping import check
 
 LAYERS = (".usd", ".usda", ".usdc")
+USD = (*LAYERS, ".usdz")
 GLTF = (".vrm", ".glb", ".gltf")
 OTHERS = (".fbx", *GLTF, ".abc", ".blend")
 """Characters and hair in other formats, which USD reads only with plug-ins or not at all."""
@@ -122,8 +123,12 @@ def one_file(out: Path, path: str | Path) -> bool:
     return os.path.realpath(out) == os.path.realpath(path) or (os.path.exists(out) and os.path.samefile(out, path))
 
 
-def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
+def write_stage(
+    path: Path, author: Callable[[Usd.Stage], None], finish: Callable[[Sdf.Layer], None] | None = None
+) -> Path:
     """Write a new USD file with what `author` puts into the stage; it gets its final name when it is complete.
+
+    `finish` gets the layer when no stage composes it any more: until then, relative paths of sublayers lead nowhere.
 
     Raises:
         NeuralocksError: the path has another extension, or cannot be written.
@@ -134,6 +139,11 @@ def write_stage(path: Path, author: Callable[[Usd.Stage], None]) -> Path:
         author(stage)
         stage.GetRootLayer().Save()
         del stage
+        if finish:
+            layer = Sdf.Layer.FindOrOpen(str(part))
+            finish(layer)
+            layer.Save()
+            del layer
         check()
     refresh_open(path)
     return path

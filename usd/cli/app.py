@@ -15,7 +15,21 @@ from neuralocks_core.errors import NeuralocksError
 
 from .bake import bake_command, join_command, simulate_command
 from .command import command_of, note, one_line, print_json
-from .options import AsJson, Grooms, Head, Joints, Materials, Model, Out, Seed, Skeleton, numbers, pairs, sides
+from .options import (
+    AsJson,
+    Grooms,
+    Head,
+    Joints,
+    Materials,
+    Model,
+    Out,
+    Seed,
+    Skeleton,
+    WithCharacter,
+    numbers,
+    pairs,
+    sides,
+)
 from .rig import app as rig_app
 from .train import one_by_one, train_command
 
@@ -86,7 +100,12 @@ def _options(
 
 @command("import")
 def import_command(
-    file: Annotated[Path, typer.Argument(help="TressFX .tfx, Cem Yuksel .hair, .data, CT2Hair .bin or USD curves.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            help="TressFX .tfx, Cem Yuksel .hair, .data, CT2Hair .bin or USD curves: parts of one head's hair."
+        ),
+    ],
     out: Out,
     unit: Annotated[
         str | None,
@@ -97,13 +116,22 @@ def import_command(
     up: Annotated[
         str | None, typer.Option(help="Up axis of the file, Y or Z; if left out, the usual one of its format.")
     ] = None,
+    character: Annotated[
+        Path | None,
+        typer.Option(help="USD character on whose head to put the hair, sized to fit unless --unit is given."),
+    ] = None,
+    skeleton: Skeleton = None,
+    head: Head = None,
+    with_character: WithCharacter = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a hair file as a USD groom."""
-    from ..assets.groom import import_groom
+    """Write hair files as USD grooms, as they are or on the head of a character."""
+    from ..assets.importing import import_groom
     from ..review.inspect import groom_facts
 
-    grooms, notes = import_groom(file, out, unit, up)
+    grooms, notes = import_groom(
+        files, out, unit, up, character=character, skeleton=skeleton, head=head, with_character=with_character
+    )
     note(notes)
     if as_json:
         print_json({"path": str(out), "grooms": [groom_facts(g) for g in grooms], "notes": notes})
@@ -256,6 +284,7 @@ def grow_command(
     ] = 0,
     skeleton: Skeleton = None,
     head: Head = None,
+    with_character: WithCharacter = False,
 ) -> None:
     """Grow a hairstyle on a character and write it as a USD groom."""
     from ..assets.grow import grow
@@ -264,7 +293,7 @@ def grow_command(
     with progress_bar("growing") as progress:
         path = grow(
             style, character, out, count, seed,
-            variation=variation, skeleton=skeleton, head=head, tell=note, progress=progress,
+            variation=variation, skeleton=skeleton, head=head, with_character=with_character, tell=note, progress=progress,
         )  # fmt: skip
     typer.echo(str(path))
 

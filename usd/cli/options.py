@@ -18,6 +18,10 @@ Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of t
 Head = Annotated[
     str | None, typer.Option("--head", help="The head joint, if its name does not tell; it carries unbound hair.")
 ]
+WithCharacter = Annotated[
+    bool,
+    typer.Option("--with-character", help="Write a layer over the character's file, to be opened and baked as it is."),
+]
 Joints = Annotated[
     list[str] | None,
     typer.Option("--joint", help="MEANING=JOINT, such as left_upper_arm=arm_L, if names do not tell; repeat for more."),

@@ -16,10 +16,9 @@ from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.rigging import assemble_rig
 from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
 
-from ..assets.groom import USD
 from ..border.damage import names_damage
 from ..border.placement import Placement
-from ..border.stage_files import OTHERS, open_stage
+from ..border.stage_files import OTHERS, USD, open_stage
 from ..border.units import Border
 from ..rig.facing import facing_notes
 from ..rig.notes import RIG_JOINTS, mirrored_notes, weight_notes

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
-from usd.assets.groom import import_groom
+from usd.assets.importing import import_groom
 
 from ..shots import Recipe, write_shot
 

@@ -10,8 +10,8 @@ import trimesh
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
-from usd.assets.groom import import_groom
 from usd.assets.grow import Barber, grow
+from usd.assets.importing import import_groom
 from usd.models import training_scene as training_scene_module
 from usd.models.training_scene import training_scene
 from usd.shot.stage import read_rigs, read_shot

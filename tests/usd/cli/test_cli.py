@@ -15,7 +15,8 @@ import typer
 
 from neuralocks_core import model as model_file
 from neuralocks_core.json_values import plain
-from usd.assets.groom import import_groom, write_groom
+from usd.assets.groom import write_groom
+from usd.assets.importing import import_groom
 from usd.baking.bake import bake
 from usd.cli.command import command_of
 from usd.review.inspect import inspect

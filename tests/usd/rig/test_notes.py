@@ -9,7 +9,7 @@ from pxr import Gf, Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigSampler
-from usd.assets.groom import import_groom
+from usd.assets.importing import import_groom
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
 from usd.rig.notes import rigged_notes

@@ -9,7 +9,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.look import Look
 from neuralocks_core.groom import Groom
 from neuralocks_core.rest_copy import NAME
-from usd.assets.groom import import_groom
+from usd.assets.importing import import_groom
 from usd.baking.bake import bake
 from usd.shot.curves import left_as_they_are, moment, read_groom
 

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair files put on a character's head, from file to bake."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.groom import Groom
+from tests.shared_data import SHARED
+from usd.assets.groom import write_groom
+from usd.assets.grow import grow
+from usd.assets.importing import import_groom
+from usd.baking.bake import bake
+from usd.review.evaluate import evaluate
+from usd.shot.stage import read_rigs, read_shot
+
+from ..commands import status
+from ..shots import Recipe, world_points, write_shot
+
+SHOT = Path(__file__).resolve().parents[3] / "examples" / "shot" / "shot.usda"
+BODY = SHOT.with_name("body.usdc")
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory) -> Path:
+    """A hairstyle of the shipped body's head, elsewhere and of another size."""
+    folder = tmp_path_factory.mktemp("hair")
+    (groom,), _ = import_groom(grow("bob", BODY, folder / "own.usda", count=200), folder / "again.usda")
+    moved = Groom("Bob", 37 * groom.points + np.float32([5, -80, 3]), groom.counts, 37 * groom.widths)
+    return write_groom(folder / "foreign.usda", moved)
+
+
+def test_hair_is_put_back_where_it_grew(foreign, tmp_path):
+    """Up to the few millimetres that a sphere is off a skull."""
+    (groom,), notes = import_groom(foreign, tmp_path / "fitted.usda", character=BODY)
+    (own,), _ = import_groom(foreign.with_name("own.usda"), tmp_path / "own.usda")
+    apart = np.linalg.norm(groom.points - own.points, axis=1)
+    assert np.median(apart) < 0.008 and apart.max() < 0.04
+    body = read_rigs(BODY)[0].surface
+    assert np.abs(body.distance(groom.points[groom.starts])[0]).max() < 1e-5
+    assert any("put on the head of /Body/Rig, at 26.9 mm for each of its units; strands" in note for note in notes), (
+        notes
+    )
+
+
+def test_of_a_stated_unit_the_size_stays(foreign, tmp_path):
+    (groom,), notes = import_groom(foreign, tmp_path / "fitted.usda", "cm", character=BODY)
+    lengths = [
+        np.linalg.norm(np.diff(points[:2], axis=0))
+        for points in (groom.points, world_points(foreign, 0.0, "/Groom/Bob"))
+    ]
+    assert lengths[0] == pytest.approx(0.01 * lengths[1], rel=1e-4)
+    assert "for each of its units" not in notes[-1]
+
+
+def test_a_layer_over_the_character_bakes_as_it_is(tmp_path, model, foreign):
+    """In the character's unit and axis, and beside the hair that the shot has."""
+    shot = write_shot(tmp_path, Recipe(unit=0.01, up="Z", bound="mesh"))
+    grown = grow("bob", shot, tmp_path / "more" / "grown.usda", count=30, with_character=True)
+    assert {item.path for item in read_shot(grown).grooms} == {"/Hero/Hair", "/Groom/bob"}
+    out = tmp_path / "more" / "twice.usda"
+    import_groom([foreign, foreign], out, character=grown, with_character=True)
+    stage = Usd.Stage.Open(str(out))
+    assert UsdGeom.GetStageUpAxis(stage) == "Z" and UsdGeom.GetStageMetersPerUnit(stage) == 0.01
+    assert stage.GetDefaultPrim().GetName() == "Hero" and stage.GetEndTimeCode() == 9
+    grooms = {item.path for item in read_shot(out).grooms}
+    assert grooms == {"/Hero/Hair", "/Groom/bob", "/Groom_2/Bob", "/Groom_2/Bob_2"}
+    result = bake(out, tmp_path / "hair.usdc", model)
+    assert {groom["path"] for groom in result.grooms} == grooms
+    head = read_rigs(shot)[0].character.canonical_to_bind[:3, 3]
+    assert np.linalg.norm(world_points(out, 1.0, "/Groom_2/Bob") - head, axis=1).max() < 0.5
+
+
+def test_what_cannot_be_put_on_a_head_is_refused(tmp_path, foreign):
+    shot = write_shot(tmp_path, Recipe(bound="none"))
+    before = shot.read_bytes()
+    few = write_groom(
+        tmp_path / "few.usda", Groom("Few", np.eye(3, dtype=np.float32), np.array([3]), np.ones(1, np.float32))
+    )
+    for source, wrong, said in (
+        (foreign, {"character": shot}, "a character with skin"),
+        (few, {"character": BODY}, "fewer than 4 strands"),
+        (foreign, {"with_character": True}, "--with-character: there is no character; name one with --character"),
+        (foreign, {"character": tmp_path / "nobody.usda"}, "nobody.usda: no such file"),
+    ):
+        with pytest.raises(NeuralocksError, match=said):
+            import_groom(source, tmp_path / "out.usda", **wrong)
+    with pytest.raises(NeuralocksError, match="shot.usda"):
+        import_groom(foreign, shot, character=shot)
+    assert shot.read_bytes() == before and not (tmp_path / "out.usda").exists()
+
+
+def test_the_command_puts_several_files_on_one_head(tmp_path, foreign, capsys):
+    words = ["import", foreign, foreign, "-o", tmp_path / "two.usda", "--character", BODY, "--json"]
+    assert status(*words) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [groom["strands"] for groom in told["grooms"]] == [200, 200]
+    called, _ = import_groom([foreign, foreign], tmp_path / "called.usda", character=BODY)
+    assert (tmp_path / "called.usda").read_bytes() == (tmp_path / "two.usda").read_bytes()
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="no real grooms here")
+@pytest.mark.parametrize("names", [("ruby/ruby_long_hair", "ruby/ruby_short_hair"), ("sintel/sintel_hair",)])
+def test_real_hair_lies_on_another_head_and_bakes(tmp_path, names, model):
+    files = [SHARED / "grooms" / f"{name}.tfx" for name in names]
+    grooms, _ = import_groom(files, tmp_path / "real.usda", character=SHOT, with_character=True)
+    body = read_rigs(SHOT)[0].surface
+    for groom in grooms:
+        used = groom.counts > 0
+        assert np.abs(body.distance(groom.points[groom.starts[used]], limit=0.1)[0]).max() < 1e-4
+    paths = [f"/Groom/{Path(name).name}" for name in names]
+    out = bake(tmp_path / "real.usda", tmp_path / "hair.usdc", model, grooms=paths, frames="70:72").path
+    card = evaluate(out, grooms=paths)
+    assert all(card.grooms[path]["inside_at_rest_percent"] < 20 for path in paths)

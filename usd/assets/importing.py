@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`neuralocks import`: hair files of other tools as USD grooms, as they are or put on a character's head."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from pxr import Sdf, UsdGeom, Vt
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
+from neuralocks_core.formats.look import Look
+from neuralocks_core.formats.units import metres_per_unit, upward_axis
+from neuralocks_core.groom import Groom
+
+from ..border.damage import names_damage
+from ..border.placement import Placement
+from ..border.stage_files import OTHERS, USD, check_not_input, check_not_over, open_stage
+from ..border.units import Border
+from ..shot.curves import find_curves, read_groom
+from ..shot.notes import few, first_of, unlikely_head
+from ..shot.stage import read_rigs
+from ..skel.stage_rig import StageRig
+from .beside import Beside, Primvar, read_beside
+from .groom import Authored, Over, write_grooms
+from .grow import Barber
+from .prims import Spline
+
+
+def import_groom(
+    source,
+    out,
+    unit: str | float | None = None,
+    up: str | None = None,
+    *,
+    character=None,
+    skeleton: str | None = None,
+    head: str | None = None,
+    with_character: bool = False,
+) -> tuple[list[Groom], list[str]]:
+    """Read hair files (TressFX, .hair, .data, .bin, USD curves) and write them as USD grooms.
+
+    Args:
+        source: a hair file, or several with parts of one head of hair.
+        out: USD file to write: in metres, Y up, or in the unit and axis of the character's file.
+        unit: "mm", "cm", "in", "m" or metres per unit of the source; if left out, what the file says, or what suits a head.
+        up: "Y" or "Z", the source's upward axis.
+        character: USD file of a character, on whose head the hair is put: upright hair that faces forward, anywhere. If no unit is
+            given, it gets the head's size, too.
+        skeleton, head: as for `bake`.
+        with_character: write a layer over the character's file, which can be opened and baked as it is.
+
+    Returns:
+        The grooms, and what a user should know.
+
+    Raises:
+        NeuralocksError: the source cannot be read, the target cannot be written, or the character has no head with skin.
+    """
+    sources = [as_path(each, "source") for each in (source if isinstance(source, list | tuple) else [source])]
+    out, rig, notes, found = as_path(out, "out"), None, [], []
+    if with_character and character is None:
+        raise NeuralocksError("--with-character: there is no character; name one with --character")
+    if character is not None:
+        rigs = read_rigs(character, skeleton, head)
+        rig = rigs[0]
+        check_not_over(out, rig.source.prim.GetStage())
+        notes += [*first_of(rigs), *rig.notes, *unlikely_head(rig)]
+    for path in sources:
+        # The head tells the size of hair that is put on it.
+        read, told = _read(path, out, 1.0 if rig and unit is None else unit, up)
+        found += read
+        notes += told
+    if rig:
+        found, told = _put_on(rig, found, resize=unit is None)
+        notes.append(f"{', '.join(map(str, sources))}: {told}")
+    over = Over(rig, as_path(character, "character")) if rig and with_character else None
+    write_grooms(out, found, rig and rig.border, over)
+    return [each.groom for each in found], notes
+
+
+def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
+    """The grooms of a file, and what a user should know."""
+    if source.suffix.lower() in (*USD, *OTHERS):
+        return _read_usd(source, out, unit, up)
+    from neuralocks_core import formats
+
+    groom, look, notes = formats.read_with_look(source, unit, up)
+    return [Authored(groom, beside=Beside(_primvars(look)))], notes
+
+
+def _put_on(rig: StageRig, found: list[Authored], resize: bool) -> tuple[list[Authored], str]:
+    """The hair on a character's head, in bind world, and how it was put there."""
+    fitted = Barber(rig.character).fitted([each.groom for each in found], resize)
+    size = f", at {1e3 * fitted.scale:.3g} mm for each of its units" if resize else ""
+    middle, most = 1e3 * np.median(fitted.moved), 1e3 * fitted.moved.max()
+    on = [replace(each, groom=groom) for each, groom in zip(found, fitted.grooms)]
+    return on, (
+        f"put on the head of {rig.path}{size}; strands were moved by {middle:.0f} mm in the median, {most:.0f} mm at most, "
+        "so that their roots lie on its skin"
+    )
+
+
+def _primvars(look: Look) -> tuple[Primvar, ...]:
+    """Colours as primvars that renderers and viewports know."""
+    names, found = Sdf.ValueTypeNames, []
+    for name, kind, values, array in (
+        ("displayColor", names.Color3fArray, look.color, Vt.Vec3fArray),
+        ("displayOpacity", names.FloatArray, look.opacity, Vt.FloatArray),
+    ):
+        if values is not None:
+            scope = UsdGeom.Tokens.constant if len(values) == 1 else UsdGeom.Tokens.vertex
+            found.append(Primvar(name, kind, scope, 1, array.FromNumpy(np.ascontiguousarray(values))))
+    return tuple(found)
+
+
+@names_damage
+def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
+    stage = open_stage(source)
+    check_not_input(out, stage)
+    border = Border.of(stage)
+    metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
+    border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
+    found, notes, left = [], [], []
+    for prim in find_curves(stage):
+        curves = UsdGeom.BasisCurves(prim)
+        groom = read_groom(prim, border.to_core @ Placement(prim).reference, notes)
+        tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
+        found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left)))
+    if not found:
+        raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
+    return found, notes + few(left, "primvars and materials are not imported like that")
