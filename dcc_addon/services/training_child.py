@@ -58,7 +58,7 @@ def _train_strands(settings: dict, say) -> None:
     say(0, 1, "Reading the character")
     character, minutes = settings["character"], settings["minutes"]
     # A short training cannot use more simulations than it has time to make.
-    rollouts = max(24, min(1200, int(80 * minutes)))
+    rollouts = max(24, min(4000, int(80 * minutes)))
     train(
         character,
         [],

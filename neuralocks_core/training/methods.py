@@ -17,13 +17,11 @@ from neuralocks_core.training.farm import RolloutFarm
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.moments import MOMENTS, MomentPool
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import RolloutBank, regress
+from neuralocks_core.training.regression import FIRST, RolloutBank, regress
 from neuralocks_core.training.regression_options import RegressionOptions
 from neuralocks_core.training.rollouts import TrainingScene
 from neuralocks_core.training.selfsupervised import train_on_moments
 
-FIRST = 24
-"""Clips to wait for before training of the network starts: enough to normalise its inputs."""
 STEPS_EACH = 10
 """Steps per further clip, in a run with a given number of steps: about as many as two cores take while one clip is made."""
 
@@ -68,7 +66,7 @@ class RolloutMethod:
     def _at_step(self, step: int) -> list[Path]:
         """New rollouts for a step of a run with a given number of steps, however fast the farm is; waits for them."""
         count, farm = min(FIRST + step // STEPS_EACH, self.farm.count), self.farm
-        if count == len(self.bank.rollouts):
+        if count == self.bank.read:
             return []
         done = step / self.options.steps
         says = f"{step} steps, simulations: "
@@ -77,12 +75,12 @@ class RolloutMethod:
 
     def material(self) -> str:
         """Short text about the training material."""
-        return f"{len(self.bank.rollouts)} rollouts"
+        return f"{self.bank.read} rollouts"
 
     def card(self) -> dict:
         """Entries for the model card."""
         residual = float(np.median([r.residual for r in self.bank.rollouts]))
-        return {"rollouts": len(self.bank.rollouts), "solver residual": residual}
+        return {"rollouts": self.bank.read, "solver residual": residual}
 
 
 class MomentMethod:

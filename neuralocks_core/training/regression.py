@@ -26,9 +26,14 @@ from neuralocks_core.training.regression_losses import regression_losses
 from neuralocks_core.training.regression_options import RegressionOptions
 from neuralocks_core.training.rollouts import Rollout, TrainingScene
 
+FIRST = 24
+"""Clips to wait for before training of the network starts: enough to normalise its inputs."""
+MOST = 1200
+"""Rollouts in memory, of 2.4 MB each, and on disk."""
+
 
 class RolloutBank:
-    """Rollouts in memory, with the network's inputs from their strands.
+    """Rollouts in memory, with the network's inputs from their strands. Of more than MOST, the FIRST and the latest stay.
 
     Args:
         scene: the one that the rollouts were made from.
@@ -41,6 +46,7 @@ class RolloutBank:
         self.lengths = [groom.length for groom in scene.grooms]
         self.rollouts: list[Rollout] = []
         self.material = scene.spec.slices["material"]
+        self._files: list[Path] = []
         self._seen: set[Path] = set()
 
     @cached_property
@@ -48,12 +54,24 @@ class RolloutBank:
         """Like `inputs`, for the grooms seen in a mirror."""
         return [strand_inputs(groom, self._codes(groom)) for groom in map(mirrored_strands, self._scene.grooms)]
 
+    @property
+    def read(self) -> int:
+        """How many rollouts it has had so far."""
+        return len(self._seen)
+
     def add(self, files: list[Path]) -> None:
-        """Read the files that are new."""
+        """Read the files that are new; those of rollouts that they replace are emptied, and stay as a sign that they were there."""
         for path in files:
-            if path not in self._seen:
-                self._seen.add(path)
-                self.rollouts.append(load(path, self._scene))
+            if path in self._seen:
+                continue
+            self._seen.add(path)
+            if not path.stat().st_size:  # emptied before training was resumed
+                continue
+            self._files.append(path)
+            self.rollouts.append(load(path, self._scene))
+            if len(self.rollouts) > MOST:
+                del self.rollouts[FIRST]
+                self._files.pop(FIRST).write_bytes(b"")
 
     @staticmethod
     def _alike(rollout: Rollout, rng: np.random.Generator, count: int) -> np.ndarray:

@@ -56,7 +56,7 @@ def train_strands(
     out: str | Path,
     options: RegressionOptions | SelfSupervisedOptions | None = None,
     *,
-    rollouts: int = 1200,
+    rollouts: int = 4000,
     processes: int = 1,
     begin: str | Path | None = None,
     resume: bool = False,
@@ -76,7 +76,7 @@ def train_strands(
         out: the model file to write, `*.neuralocks`.
         options: budget and settings of the network's training; their type chooses the method: RegressionOptions
             for rollouts, SelfSupervisedOptions for the paper's.
-        rollouts: how many to make while training goes on; about 2.4 MB of memory each.
+        rollouts: how many to make while training goes on; the latest `regression.MOST` are kept, 2.4 MB of memory and disk each.
         processes: processes that make rollouts; the network's training uses the remaining cores.
         begin: a model whose network and strand codes training starts from, instead of random weights and new codes.
         resume: continue from the folder `OUT.training` beside the model: simulations, strand codes, and the checkpoint if there

@@ -57,7 +57,9 @@ def train_command(
     variations: Annotated[
         int, typer.Option(min=0, max=50, help="Variations of each library style, besides the style itself.")
     ] = 0,
-    rollouts: Annotated[int, typer.Option(help="Simulations to learn from.")] = 1200,
+    rollouts: Annotated[
+        int, typer.Option(help="Simulations to make and learn from, the latest 1200 at a time.")
+    ] = 4000,
     processes: Annotated[int, typer.Option(help="Processes that simulate while the network trains.")] = 1,
     method: Annotated[
         str,

@@ -38,7 +38,7 @@ def train(
     begin: str | Path | None = None,
     resume: bool = False,
     variations: int = 0,
-    rollouts: int = 1200,
+    rollouts: int = 4000,
     processes: int = 1,
     credits=(),
     keep_work: bool = False,
