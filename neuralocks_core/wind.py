@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,7 +43,7 @@ class Wind:
         mean = np.asarray(self.mean, float)
         if mean.shape != (3,) or not np.isfinite(mean).all():
             raise NeuralocksError(f"wind: {self.mean} is not a vector; give three numbers [m/s^2]")
-        if (size := np.linalg.norm(mean)) > STRONGEST * (1 + 1e-6):
+        if (size := math.hypot(*mean)) > STRONGEST * (1 + 1e-6):
             raise NeuralocksError(f"wind: is {size:.3g} m/s^2 strong; give at most {STRONGEST:g} (gravity is 9.81)")
         if not 0 <= self.gusts <= 1:
             raise NeuralocksError(f"gusts {self.gusts}: give a share of the wind from 0 to 1")
@@ -65,8 +66,8 @@ class Wind:
         """A level vector (3,) across the wind, as long as its mean."""
         x, y, z = self.mean
         level = np.array([z, 0.0, -x])
-        size = np.linalg.norm(level)
-        return np.linalg.norm(self.mean) * (level / size if size > 1e-9 else np.array([1.0, 0.0, 0.0]))
+        size = math.hypot(x, z)
+        return math.hypot(x, y, z) * (level / size if size > 1e-9 else np.array([1.0, 0.0, 0.0]))
 
 
 def check_felt(feels: bool) -> None:

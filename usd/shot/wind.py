@@ -10,6 +10,7 @@ from pxr import Gf, Usd
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.wind import Wind
 
+from ..border.amounts import check_number
 from ..border.units import Border
 from .recorded import recorded
 
@@ -24,6 +25,8 @@ def as_wind(mean, gusts: float | None = None) -> Wind | None:
     Raises:
         NeuralocksError: not a wind, or gusts without one.
     """
+    if gusts is not None:
+        check_number("--gusts", gusts, 0, 1)
     if mean is None:
         if gusts is not None:
             raise NeuralocksError(f"--gusts {gusts:g}: there is no wind that could vary; give --wind X,Y,Z, too")
@@ -31,7 +34,7 @@ def as_wind(mean, gusts: float | None = None) -> Wind | None:
     given = mean.tolist() if isinstance(mean, np.ndarray) else mean
     if not isinstance(given, list | tuple) or len(given) != 3 or not all(isinstance(each, Real) for each in given):
         raise NeuralocksError(f"wind: {mean!r} is not one; give three numbers [m/s^2], such as (2, 0, 0)")
-    wind = Wind(tuple(given)) if gusts is None else Wind(tuple(given), gusts)
+    wind = Wind(tuple(given)) if gusts is None else Wind(tuple(given), float(gusts))
     return wind if any(wind.mean) else None
 
 

@@ -62,9 +62,10 @@ def test_the_command_bakes_what_the_call_bakes(tmp_path, model, capsys):
         (["--wind", "2,0"], "--wind 2,0: is not X,Y,Z; write for example 2,0,0"),
         (["--wind", "2,0,x"], "--wind 2,0,x: is not X,Y,Z"),
         (["--wind", "9,0,0"], "wind: is 9 m/s^2 strong; give at most 8"),
+        (["--wind", "1e308,1e308,0"], "m/s^2 strong; give at most 8"),
         (["--wind", "nan,0,0"], "wind: (nan, 0.0, 0.0) is not a vector"),
         (["--gusts", "0.5"], "--gusts 0.5: there is no wind that could vary; give --wind X,Y,Z, too"),
-        (["--wind", "1,0,0", "--gusts", "2"], "gusts 2.0: give a share"),
+        (["--wind", "1,0,0", "--gusts", "2"], "--gusts 2.0: must be a number from 0 to 1"),
     ):
         capsys.readouterr()
         assert status("bake", shot, "-o", tmp_path / "no.usdc", "--model", model, *wrong) == 1
@@ -81,6 +82,8 @@ def test_a_calm_is_a_bake_without_wind(tmp_path, model):
 
 @pytest.mark.parametrize("wrong", ["2,0,0", (1, 2), (1, 2, "3"), {"x": 1}, 2.0])
 def test_what_is_no_wind_is_refused(tmp_path, model, wrong):
+    with pytest.raises(NeuralocksError, match="--gusts 'strong': must be a number from 0 to 1"):
+        bake(write_shot(tmp_path), tmp_path / "out.usdc", model, wind=(1, 0, 0), gusts="strong")
     with pytest.raises(NeuralocksError, match="wind: .* is not one; give three numbers"):
         bake(write_shot(tmp_path), tmp_path / "out.usdc", model, wind=wrong)
 
