@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texts of any length in the sidebar, in lines that fit it."""
+"""What the sidebar's panels consist of: texts of any length in lines that fit, hints, bars."""
 
 import blf
 import bpy
 
+from .services.panel_errors import for_the_panel
 from .services.wrapping import wrapped
+from .session import session
+from .unsampled import FIRST
 
 MARGINS, ICON = 70, 25
 """Width of the sidebar's tabs with the margins of a panel and of a box in it, and of an icon with its space, at scale 1."""
@@ -22,6 +25,25 @@ def words(layout, text: str, icon: str, lines: int = 0) -> int:
         # Untranslated: Blender would translate a line that is one of its own words, such as an object called Head.
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE", translate=False)
     return len(found)
+
+
+def message(layout, name: str) -> None:
+    """What went wrong with an object, or what it waits for, if anything."""
+    if text := session.messages.get(name):
+        words(layout, for_the_panel(text), "TIME" if text.endswith(FIRST) else "ERROR")
+
+
+def hint(text: str) -> dict[str, str]:
+    """What a property shows while it is empty, if Blender supports that."""
+    return {"placeholder": text} if "placeholder" in bpy.types.UILayout.bl_rna.functions["prop"].parameters else {}
+
+
+def progress(layout, done: float, text: str) -> None:
+    """How far something is, from 0 to 1; older Blenders draw no bar."""
+    if hasattr(layout, "progress"):
+        layout.progress(factor=done, text=text)
+    else:
+        layout.label(text=text, icon="TIME")
 
 
 def _room(icon: str) -> tuple:

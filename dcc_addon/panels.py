@@ -7,7 +7,7 @@ from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP
 
-from .labels import words
+from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
 from .scene.actions import has_keys
 from .scene.attach import has_cache, stretched_since
@@ -17,7 +17,6 @@ from .services.panel_errors import for_the_panel
 from .services.remaining import in_words
 from .services.sliders import SLIDERS
 from .session import session
-from .unsampled import FIRST
 
 STRETCHED = "Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
 _findings: dict[tuple, tuple[list, str]] = {}
@@ -293,25 +292,6 @@ def findings(armature) -> tuple[list[str], str]:
             _findings[key] = [], str(error)
     (lines, problem), body = _findings[key], armature.neuralocks_character.body
     return lines, problem or (left_behind(body, armature) if body is not None else "")
-
-
-def message(layout, name: str) -> None:
-    """What went wrong with an object, or what it waits for, if anything."""
-    if text := session.messages.get(name):
-        words(layout, for_the_panel(text), "TIME" if text.endswith(FIRST) else "ERROR")
-
-
-def hint(text: str) -> dict[str, str]:
-    """What a property shows while it is empty, if Blender supports that."""
-    return {"placeholder": text} if "placeholder" in bpy.types.UILayout.bl_rna.functions["prop"].parameters else {}
-
-
-def progress(layout, done: float, text: str) -> None:
-    """How far something is, from 0 to 1; older Blenders draw no bar."""
-    if hasattr(layout, "progress"):
-        layout.progress(factor=done, text=text)
-    else:
-        layout.label(text=text, icon="TIME")
 
 
 CLASSES = (NEURALOCKS_PT_character, NEURALOCKS_PT_wind, NEURALOCKS_PT_strands, NEURALOCKS_PT_rig, NEURALOCKS_PT_bake)

@@ -13,6 +13,7 @@ import typer
 
 from neuralocks_core.errors import NeuralocksError
 
+from .assets import body_command, grow_command, import_command
 from .bake import bake_command, join_command, simulate_command
 from .command import command_of, note, one_line, print_json
 from .options import (
@@ -23,10 +24,7 @@ from .options import (
     Materials,
     Model,
     Out,
-    Seed,
     Skeleton,
-    WithCharacter,
-    numbers,
     pairs,
     sides,
 )
@@ -47,6 +45,9 @@ command("bake")(bake_command)
 command("join")(join_command)
 command("simulate")(simulate_command)
 command("train")(train_command)
+command("import")(import_command)
+command("grow")(grow_command)
+command("body")(body_command)
 app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export.")
 
 
@@ -58,7 +59,7 @@ def main(arguments: list[str] | None = None) -> None:
     # If the home folder cannot be written, as on a farm, matplotlib should not warn about it.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     words = [_kept(word) for word in (sys.argv[1:] if arguments is None else arguments)]
-    if os.name == "nt" and words[:1] == ["join"]:  # shells there do not expand * and ?
+    if os.name == "nt" and words[:1] in (["join"], ["import"]):  # shells there do not expand * and ?
         words = [name for word in words for name in _matching(word)]
     try:
         app(one_by_one(words) if words[:1] == ["train"] else words)
@@ -96,48 +97,6 @@ def _options(
     ] = False,
 ) -> None:
     pass
-
-
-@command("import")
-def import_command(
-    files: Annotated[
-        list[Path],
-        typer.Argument(
-            help="TressFX .tfx, Cem Yuksel .hair, .data, CT2Hair .bin or USD curves: parts of one head's hair."
-        ),
-    ],
-    out: Out,
-    unit: Annotated[
-        str | None,
-        typer.Option(
-            help="mm, cm, m, in, or metres per unit of the file; if left out, as the file says or the scalp's size suggests."
-        ),
-    ] = None,
-    up: Annotated[
-        str | None, typer.Option(help="Up axis of the file, Y or Z; if left out, the usual one of its format.")
-    ] = None,
-    character: Annotated[
-        Path | None,
-        typer.Option(help="USD character on whose head to put the hair, sized to fit unless --unit is given."),
-    ] = None,
-    skeleton: Skeleton = None,
-    head: Head = None,
-    with_character: WithCharacter = False,
-    as_json: AsJson = False,
-) -> None:
-    """Write hair files as USD grooms, as they are or on the head of a character."""
-    from ..assets.importing import import_groom
-    from ..review.inspect import groom_facts
-
-    grooms, notes = import_groom(
-        files, out, unit, up, character=character, skeleton=skeleton, head=head, with_character=with_character
-    )
-    note(notes)
-    if as_json:
-        print_json({"path": str(out), "grooms": [groom_facts(g) for g in grooms], "notes": notes})
-    else:
-        for groom in grooms:
-            typer.echo(f"{out}: {groom.strand_count} strands, {len(groom.points)} vertices of {groom.name}")
 
 
 @command("inspect")
@@ -258,44 +217,6 @@ def export_command(
         model, out, shot, grooms=groom, skeleton=skeleton, head=head, joints=pairs(joint, "--joint")
     ):
         typer.echo(str(path))
-
-
-@command("body")
-def body_command(
-    out: Out,
-    phenotype: Annotated[list[str] | None, typer.Option(help="NAME=VALUE of anny's parameters, 0 to 1.")] = None,
-) -> None:
-    """Write the statistical body anny as a USD character (extra 'body')."""
-    from ..assets.body import write_body
-
-    typer.echo(str(write_body(out, phenotype=numbers(phenotype, "--phenotype") or None)))
-
-
-@command("grow")
-def grow_command(
-    style: Annotated[str, typer.Argument(help="A style of the procedural library; an unknown name lists them.")],
-    character: Annotated[Path, typer.Option(help="USD character to grow it on.")],
-    out: Out,
-    count: Annotated[int, typer.Option(help="Strands, up to 150,000.")] = 10_000,
-    seed: Seed = 0,
-    variation: Annotated[
-        int,
-        typer.Option(min=0, help="Number of a variation, with another cut, parting and waves; 0 is the style itself."),
-    ] = 0,
-    skeleton: Skeleton = None,
-    head: Head = None,
-    with_character: WithCharacter = False,
-) -> None:
-    """Grow a hairstyle on a character and write it as a USD groom."""
-    from ..assets.grow import grow
-    from .progress import progress_bar
-
-    with progress_bar("growing") as progress:
-        path = grow(
-            style, character, out, count, seed,
-            variation=variation, skeleton=skeleton, head=head, with_character=with_character, tell=note, progress=progress,
-        )  # fmt: skip
-    typer.echo(str(path))
 
 
 @command("demo")
