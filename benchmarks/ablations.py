@@ -58,7 +58,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
     """Train and measure each variant; prints a Markdown table as it goes."""
     coder = kept_coder(work)
     scenes = {"rollouts": scene, "held_out": replace(scene, held_out=True)}
-    files = {name: sorted((work / name).glob("*.npz"))[:rollouts] for name in scenes}
+    files = {name: [p for p in sorted((work / name).glob("*.npz")) if p.stat().st_size][:rollouts] for name in scenes}
     print(f"{len(files['rollouts'])} rollouts, {budget} each, seed {scene.seed}\n")
     names = "position rigid motion motion_static motion_ratio velocity droop penetration".split()
     print("| variant | steps | CPU s | " + " | ".join(names) + " |")

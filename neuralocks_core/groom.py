@@ -12,6 +12,8 @@ from neuralocks_core.errors import NeuralocksError
 
 # Farther than this from the origin, it is not hair on a character, and float32 no longer resolves a millimetre.
 LARGEST_COORDINATE = 1e4
+WIDTH = 8e-5
+"""Of a hair, if nobody says [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,9 @@ class Groom:
         self._check_values("points", self.points, LARGEST_COORDINATE, "m")
 
         strands, total = len(self.counts), len(self.points)
-        widths = np.full(1, 8e-5, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
+        widths = (
+            np.full(1, WIDTH, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
+        )
         if widths.ndim != 1 or len(widths) not in {1, strands, total}:
             raise self._error(
                 f"widths have shape {widths.shape}", f"give 1, {strands} (one a strand) or {total} (one a point)"

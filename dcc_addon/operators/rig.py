@@ -115,7 +115,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
     def steps(self, context):
         armature, scene = shown_armature(context), context.scene
         name, model = armature.name_full, model_path(armature, "rig")
-        strength = armature.neuralocks_character.rig_motion
+        options, wind = {"strength": armature.neuralocks_character.rig_motion}, blowing(armature)
         out = Path(output_path(self.filepath or scene.neuralocks.output))
         if not self.filepath:
             out = out.with_name(f"{out.stem}_rig{out.suffix}")
@@ -129,8 +129,8 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name), share=0.5)
         bones = bind(named(name), sampled).bones  # reports what is wrong before anything is written
-        wind = blowing(named(name)) if bones.model.feels_wind else None
-        options = {"strength": strength, **(wind._asdict() if wind else {})}
+        if wind and bones.model.feels_wind:
+            options |= wind._asdict()
         head, loop = sampled.character.skeleton.names[sampled.character.head], sampled.clip.loop
         with undone_on_failure(out, shot):
             prims = write_shot(shot, named(name), scene, sampled, [])

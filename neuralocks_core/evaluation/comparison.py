@@ -26,6 +26,8 @@ STEP = 1 / 30
 RUN_IN = 10.0
 """Time [s] after which earlier motion has died away: a loop's hair, simulated from rest for this long, ends a period where it
 began, except for millimetres in a few strands that creep over skin."""
+BLOWN = 3.0
+"""Time [s] after which hair remembers no earlier gusts."""
 MOST_STEPS = 10_000
 """Over five minutes; a whole rollout is held in memory."""
 TOGETHER = 32

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +84,7 @@ def read_with_look(
 
     scale = wanted if wanted is not None else raw.unit
     if wanted is None:
-        scalp = _scalp(raw, points)
+        scalp = _scalp(_roots(raw, points))
         size = float((points.max(axis=0).astype(np.float64) - points.min(axis=0)).max())
         likely = _likely_unit(scalp if scalp > 0 else size / 2)  # one strand, or all from one point
         if scale is None:
@@ -116,6 +117,23 @@ def read_with_look(
         fact = f"{still} of {groom.strand_count} strands have no two distinct points"
         notes.append(f"{path}: {fact}; they are kept, but will not move on their own")
     return groom, look, notes
+
+
+def common_unit(paths: Sequence[str | Path]) -> float | None:
+    """The unit [m] that suits the roots of several files with parts of one head of hair, none of which states its own; None if one
+    does, or if their roots tell nothing.
+
+    Raises:
+        NeuralocksError: as `read`.
+    """
+    roots = []
+    for path in map(Path, paths):
+        raw = _raw(path, _content(path))
+        if raw.unit is not None:
+            return None
+        roots.append(_roots(raw, raw.points))
+    scalp = _scalp(np.concatenate(roots))
+    return _likely_unit(scalp) if 0 < scalp < np.inf else None
 
 
 def _content(path: Path) -> bytes:
@@ -172,10 +190,14 @@ def _check_finite(points: np.ndarray, path: Path) -> None:
         )
 
 
-def _scalp(raw: RawGroom, points: np.ndarray) -> float:
-    """Width of the scalp, by the roots, in units of the file."""
+def _roots(raw: RawGroom, points: np.ndarray) -> np.ndarray:
+    """First points (S, 3) of the strands, of all points (P, 3) in units of the file."""
     starts = np.cumsum(raw.counts, dtype=np.int64) - raw.counts
-    roots = points[starts[raw.counts > 0]].astype(np.float64)
+    return points[starts[raw.counts > 0]].astype(np.float64)
+
+
+def _scalp(roots: np.ndarray) -> float:
+    """Width of the scalp, by the roots, in units of the file."""
     return float(np.ptp(np.percentile(roots, [2, 98], axis=0), axis=0).max()) if len(roots) else 0.0
 
 

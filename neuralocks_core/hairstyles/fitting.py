@@ -10,13 +10,17 @@ import numpy as np
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.groom import Groom
+from neuralocks_core.groom import WIDTH, Groom
 from neuralocks_core.hairstyles.scalp import Scalp
 
 FEWEST = 4
 """Roots that determine a sphere."""
 OFF = 0.2
 """A root this far off the sphere, relative to its radius, such as that of a tail's hair tie, does not count."""
+
+
+DOUBT = 0.12
+"""Largest share by which the radius of a head may be in doubt: whole heads of hair have 0.05 to 0.09, fringes and tails 0.2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +30,7 @@ class Fitted:
     Attributes:
         grooms: in the scalp's space [m].
         scale: how many times as large as it was the hair is now.
-        moved: how far each strand was moved to bring its root onto the skin, (S,) [m].
+        moved: how far each strand with vertices was moved to bring its root onto the skin, (S,) [m].
     """
 
     grooms: list[Groom]
@@ -45,29 +49,36 @@ def fit(grooms: Sequence[Groom], scalp: Scalp, skin: Collider, resize: bool = Tr
         resize: give the hair the scalp's size, too.
 
     Raises:
-        NeuralocksError: too few roots, or all in one place.
+        NeuralocksError: the roots are too few, in one place, or, to resize them, on too small a part of a head.
     """
     roots = [each.points[each.starts[each.counts > 0]].astype(float) for each in grooms]
-    if sum(map(len, roots)) < FEWEST:
+    every = np.concatenate(roots)
+    if len(every) < FEWEST:
         raise NeuralocksError(
             f"groom: has fewer than {FEWEST} strands, which do not tell where the head is; place it yourself"
         )
-    every = np.concatenate(roots)
     if not np.ptp(every, axis=0).max() > 1e-6 * np.abs(every).max():
         raise NeuralocksError(
             "groom: all its roots are in one place, which does not tell where the head is; place it yourself"
         )
-    centre, radius = sphere(every)
     middle, wanted = sphere(scalp.points[np.unique(scalp.triangles)])
-    scale = wanted / radius if resize else 1.0
-    found, moved = [], []
+    centre, radius = sphere(every)
+    if not resize:
+        centre, radius = _of_radius(every, centre, wanted), wanted
+    elif not _doubt(every, centre, radius) <= DOUBT:
+        raise NeuralocksError(
+            "groom: its roots are on too small a part of a head to tell how large that is; import it together with the other "
+            "parts of that hair, or give --unit"
+        )
+    scale, found, moved = wanted / radius, [], []
     for each, own in zip(grooms, roots):
         onto = np.zeros((each.strand_count, 3))
-        placed = (own - centre) * scale + middle
-        distance, normal = skin.distance(placed, limit=np.inf)
+        distance, normal = skin.distance((own - centre) * scale + middle, limit=np.inf)
         onto[each.counts > 0] = -distance[:, None] * normal
         points = (each.points - centre) * scale + middle + np.repeat(onto, each.counts, axis=0)
-        found.append(replace(each, points=points.astype(np.float32), widths=np.float32(scale) * each.widths))
+        # A thickness that the file did not state is that of hair, whatever the head's size.
+        widths = each.widths if (each.widths == WIDTH).all() else np.float32(scale) * each.widths
+        found.append(replace(each, points=points.astype(np.float32), widths=widths))
         moved.append(np.abs(distance))
     return Fitted(found, scale, np.concatenate(moved))
 
@@ -79,8 +90,37 @@ def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
         design = np.concatenate([2 * used, np.ones((len(used), 1))], axis=1)
         x = np.linalg.lstsq(design, np.square(used).sum(1), rcond=None)[0]
         centre, radius = x[:3], float(np.sqrt(x[3] + np.square(x[:3]).sum()))
-        near = points[np.abs(np.linalg.norm(points - centre, axis=1) - radius) < OFF * radius]
-        if len(near) < FEWEST:
+        near = _near(points, centre, radius)
+        if near.sum() < FEWEST:
             break
-        used = near
+        used = points[near]
     return centre, radius
+
+
+def _near(points: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
+    return np.abs(np.linalg.norm(points - centre, axis=1) - radius) < OFF * radius
+
+
+def _doubt(points: np.ndarray, centre: np.ndarray, radius: float) -> float:
+    """By which share the radius might differ, if all points were off the sphere in the worst way, as far as they are on average, and
+    at least by a hundredth of the radius.
+    """
+    apart = (points - centre)[_near(points, centre, radius)]
+    far = np.linalg.norm(apart, axis=1)
+    if len(far) < FEWEST:
+        return np.inf
+    slopes = np.concatenate([apart / far[:, None], np.ones((len(far), 1))], axis=1)
+    off = max(np.sqrt(np.square(far - radius).mean()) / radius, 0.01)
+    return float(np.sqrt(np.linalg.inv(slopes.T @ slopes / len(far) + 1e-12 * np.eye(4))[3, 3]) * off)
+
+
+def _of_radius(points: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
+    """Centre (3,) of the sphere of a known radius that is nearest to points (n, 3), searched from a centre by Gauss-Newton steps."""
+    for _ in range(30):
+        apart = points - centre
+        far = np.maximum(np.linalg.norm(apart, axis=1), 1e-12)
+        near = np.abs(far - radius) < OFF * radius
+        used = near if near.sum() >= FEWEST else slice(None)
+        step = np.linalg.lstsq(apart[used] / far[used, None], (far - radius)[used], rcond=None)[0]
+        centre = centre + step
+    return centre

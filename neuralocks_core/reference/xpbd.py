@@ -43,7 +43,7 @@ def simulate_xpbd(
     Args:
         rest, head, body, triangles, material, dt, rest_support, bind_body, margin, gravity, wind, device, progress: as
             in `solver.simulate`.
-        substeps: per frame.
+        substeps: per frame; the wind is the same in all of them.
 
     Returns:
         As `solver.simulate`; residual is NaN (nothing is solved for), iterations are the substeps.

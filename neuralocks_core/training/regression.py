@@ -8,6 +8,7 @@ step is pulled to the converged solver's result instead. `selfsupervised.py` has
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 
@@ -29,7 +30,7 @@ from neuralocks_core.training.rollouts import Rollout, TrainingScene
 FIRST = 24
 """Clips to wait for before training of the network starts: enough to normalise its inputs."""
 MOST = 1200
-"""Rollouts in memory, of 2.4 MB each, and on disk."""
+"""Rollouts in memory, of 2.4 MB each, and on disk, besides those that have been made and not read yet."""
 
 
 class RolloutBank:
@@ -71,7 +72,8 @@ class RolloutBank:
             self.rollouts.append(load(path, self._scene))
             if len(self.rollouts) > MOST:
                 del self.rollouts[FIRST]
-                self._files.pop(FIRST).write_bytes(b"")
+                with suppress(OSError):  # then it stays, and takes up space
+                    self._files.pop(FIRST).write_bytes(b"")
 
     @staticmethod
     def _alike(rollout: Rollout, rng: np.random.Generator, count: int) -> np.ndarray:

@@ -59,6 +59,9 @@ class Over:
         """Make a layer, to be found at `out`, one over the file."""
         codes = self.rig.time_codes[[0, -1]].tolist()
         write_header(layer, self.stage, self.rig.border, self.path, out, codes)
+        if not self.stage.HasAuthoredTimeCodeRange():  # a range here would hide what animates the character later
+            for name in ("startTimeCode", "endTimeCode"):
+                layer.pseudoRoot.ClearInfo(name)
 
 
 def write_groom(path, groom: Groom, border: Border | None = None, over: Over | None = None) -> Path:
@@ -67,7 +70,7 @@ def write_groom(path, groom: Groom, border: Border | None = None, over: Over | N
 
 
 def write_grooms(path, grooms: list[Authored], border: Border | None = None, over: Over | None = None) -> Path:
-    """Write grooms below one root prim `/Groom`; the file is complete once it has its final name.
+    """Write grooms below a root prim, `/Groom` if that name is free; the file is complete once it has its final name.
 
     Args:
         path: USD file to write.

@@ -18,7 +18,7 @@ from neuralocks_core.hairstyles import grow as grow_style
 from neuralocks_core.hairstyles.fitting import Fitted, fit
 from neuralocks_core.progress import Progress, silent, within
 
-from ..border.stage_files import check_layer_name, check_not_over
+from ..border.stage_files import check_layer_name, check_not_input, check_not_over
 from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
 from .groom import Over, write_groom
@@ -62,7 +62,7 @@ def grow(
     check_layer_name(out)
     rigs = read_rigs(character, skeleton, head)
     rig = rigs[0]
-    check_not_over(out, rig.source.prim.GetStage())
+    (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
     check_writable(out)
     if tell:
         tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])

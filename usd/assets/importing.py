@@ -58,16 +58,17 @@ def import_groom(
     """
     sources = [as_path(each, "source") for each in (source if isinstance(source, list | tuple) else [source])]
     out, rig, notes, found = as_path(out, "out"), None, [], []
-    if with_character and character is None:
-        raise NeuralocksError("--with-character: there is no character; name one with --character")
+    for option, value in (("with-character", with_character), ("skeleton", skeleton), ("head", head)):
+        if value and character is None:
+            raise NeuralocksError(f"--{option}: there is no character; name one with --character")
     if character is not None:
         rigs = read_rigs(character, skeleton, head)
         rig = rigs[0]
-        check_not_over(out, rig.source.prim.GetStage())
+        (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
         notes += [*first_of(rigs), *rig.notes, *unlikely_head(rig)]
+    counted = unit if unit is not None else _common_unit(sources, rig is not None)
     for path in sources:
-        # The head tells the size of hair that is put on it.
-        read, told = _read(path, out, 1.0 if rig and unit is None else unit, up)
+        read, told = _read(path, out, counted, up)
         found += read
         notes += told
     if rig:
@@ -76,6 +77,17 @@ def import_groom(
     over = Over(rig, as_path(character, "character")) if rig and with_character else None
     write_grooms(out, found, rig and rig.border, over)
     return [each.groom for each in found], notes
+
+
+def _common_unit(sources: list[Path], sized: bool) -> float | None:
+    """The unit of hair files of which none states its own: one for all parts of a head; None to let each file's reader find it, and
+    tell. Where a head sizes the hair, it need not be told.
+    """
+    if len(sources) < 2 and not sized or any(path.suffix.lower() in (*USD, *OTHERS) for path in sources):
+        return None
+    from neuralocks_core import formats
+
+    return formats.common_unit(sources)
 
 
 def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
@@ -91,7 +103,7 @@ def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]
 def _put_on(rig: StageRig, found: list[Authored], resize: bool) -> tuple[list[Authored], str]:
     """The hair on a character's head, in bind world, and how it was put there."""
     fitted = Barber(rig.character).fitted([each.groom for each in found], resize)
-    size = f", at {1e3 * fitted.scale:.3g} mm for each of its units" if resize else ""
+    size = f", made {fitted.scale:.3g} times as large" if resize else ""
     middle, most = 1e3 * np.median(fitted.moved), 1e3 * fitted.moved.max()
     on = [replace(each, groom=groom) for each, groom in zip(found, fitted.grooms)]
     return on, (

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.evaluation.comparison import RUN_IN, simulated
+from neuralocks_core.evaluation.comparison import BLOWN, RUN_IN, simulated
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import cores
@@ -105,7 +105,8 @@ class _SimulatedPoser:
         # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest. A loop has no beginning, so
         # its wanted frames come after a run-in.
         wanted = clip.wrapped(seconds) if loop else np.maximum(seconds, clip.start)
-        times = np.unique([clip.start - RUN_IN * loop, *wanted])
+        # A wind has no beginning, either.
+        times = np.unique([clip.start - (RUN_IN if loop else BLOWN if wind else 0), *wanted])
         self._row = dict(zip(codes, np.searchsorted(times, wanted), strict=True))
         character = item.attachment.character
         self._skin = RootSkin(character, [every], clip)

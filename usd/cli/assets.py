@@ -21,7 +21,7 @@ def import_command(
     unit: Annotated[
         str | None,
         typer.Option(
-            help="mm, cm, m, in, or metres per unit of the file; if left out, as the file says or the scalp's size suggests."
+            help="mm, cm, m, in, or metres per unit of the file; if left out, as the file says or the scalp's size suggests, and with --character sized to fit the head."
         ),
     ] = None,
     up: Annotated[
@@ -29,7 +29,7 @@ def import_command(
     ] = None,
     character: Annotated[
         Path | None,
-        typer.Option(help="USD character on whose head to put the hair, sized to fit unless --unit is given."),
+        typer.Option(help="USD character on whose head to put the hair."),
     ] = None,
     skeleton: Skeleton = None,
     head: Head = None,

@@ -20,7 +20,10 @@ Head = Annotated[
 ]
 WithCharacter = Annotated[
     bool,
-    typer.Option("--with-character", help="Write a layer over the character's file, to be opened and baked as it is."),
+    typer.Option(
+        "--with-character",
+        help="Write a layer over the character's file, to be opened and baked as it is (with the same --skeleton).",
+    ),
 ]
 Joints = Annotated[
     list[str] | None,

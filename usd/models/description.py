@@ -137,7 +137,11 @@ def described(file: model_file.ModelFile) -> dict:
             "pose joints": spec.pose_joints,
             "shape": MEASURES,
         }
-        result["sliders"] = {name: how for name, how in SLIDERS.items() if name != "wind" or spec.feels_wind}
+        result["sliders"] = {
+            name: how
+            for name, how in SLIDERS.items()
+            if name != "wind" or (spec.feels_wind and file.meta.get("static") is not True)
+        }
     else:
         result["features"] = _input(spec, ["pose", "gravity", "history"], RIG_INPUT, _PLACE)
         result["features"]["how"]["history"] += (

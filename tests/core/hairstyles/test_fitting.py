@@ -9,7 +9,7 @@ import trimesh
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.groom import Groom
+from neuralocks_core.groom import WIDTH, Groom
 from neuralocks_core.hairstyles import Scalp
 from neuralocks_core.hairstyles.fitting import fit, sphere
 
@@ -59,6 +59,31 @@ def test_hair_of_a_known_size_keeps_it(head):
     assert found.scale == 1.0
     assert np.linalg.norm(points[:, 2] - points[:, 0], axis=1) == pytest.approx(0.08, abs=1e-5)
     assert np.abs(head[1].distance(points[:, 0])[0]).max() < 1e-5
+
+
+def test_a_thickness_that_no_file_states_is_hairs(head):
+    thin = replace(hair([0, 0, 0], 60.0), widths=np.full(1, WIDTH, np.float32))
+    assert fit([thin], *head).grooms[0].widths == pytest.approx(WIDTH)
+
+
+def test_a_part_of_a_head_does_not_tell_its_size(head):
+    """The roots of a fringe fit heads of many sizes; of a line, any. If the size is known, they lie on the skin."""
+    rng = np.random.default_rng(1)
+    side, up = rng.uniform(-0.5, 0.5, 200), rng.uniform(0, 0.1, 200)
+    for high in (up, 0 * up):
+        out = np.stack([np.sin(side) * np.cos(high), np.sin(high), np.cos(side) * np.cos(high)], axis=1)
+        roots = RADIUS * out + rng.normal(0, 0.001, (200, 3)) + [3, 4, 5]
+        points = np.stack([roots, roots + 0.05 * out], axis=1)
+        fringe = Groom(
+            "fringe", points.reshape(-1, 3).astype(np.float32), np.full(200, 2), np.full(1, 1e-4, np.float32)
+        )
+        with pytest.raises(
+            NeuralocksError, match="too small a part of a head to tell how large that is; import it tog"
+        ):
+            fit([fringe], *head)
+        found = fit([fringe], *head, resize=False)
+        assert found.scale == 1.0 and found.moved.max() < 0.01
+        assert np.abs(head[1].distance(found.grooms[0].points[::2])[0]).max() < 1e-5
 
 
 def test_parts_of_one_head_stay_together(head):

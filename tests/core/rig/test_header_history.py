@@ -85,6 +85,11 @@ def test_a_wind_is_felt_as_in_a_bake(tmp_path, rate):
     ours = run_c(compiled(tmp_path, harness), rows, wanted.shape[1])
     error = np.sqrt(np.square(ours - wanted)[t > 2].mean() / np.square(wanted[t > 2]).mean())
     assert error < 0.03, error
+    # At first, and so after a reset, the wind of that moment has always blown.
+    felt = ours.reshape(len(t), -1, 6)
+    steady = (wind.at(t[0]) / 9.81) @ joints[0, who.head, :3, :3]
+    np.testing.assert_allclose(felt[0, :, :3], np.outer(model.spec.bin_weights, steady), atol=1e-5)
+    np.testing.assert_allclose(felt[1, :, :3], felt[0, :, :3], atol=0.1)
 
 
 @pytest.mark.parametrize(

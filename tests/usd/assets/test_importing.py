@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from tests.core.formats.groom_files import put, tressfx_text
 from tests.shared_data import SHARED
 from usd.assets.groom import write_groom
 from usd.assets.grow import grow
@@ -42,9 +43,7 @@ def test_hair_is_put_back_where_it_grew(foreign, tmp_path):
     assert np.median(apart) < 0.008 and apart.max() < 0.04
     body = read_rigs(BODY)[0].surface
     assert np.abs(body.distance(groom.points[groom.starts])[0]).max() < 1e-5
-    assert any("put on the head of /Body/Rig, at 26.9 mm for each of its units; strands" in note for note in notes), (
-        notes
-    )
+    assert any("put on the head of /Body/Rig, made 0.0269 times as large; strands" in note for note in notes), notes
 
 
 def test_of_a_stated_unit_the_size_stays(foreign, tmp_path):
@@ -54,7 +53,7 @@ def test_of_a_stated_unit_the_size_stays(foreign, tmp_path):
         for points in (groom.points, world_points(foreign, 0.0, "/Groom/Bob"))
     ]
     assert lengths[0] == pytest.approx(0.01 * lengths[1], rel=1e-4)
-    assert "for each of its units" not in notes[-1]
+    assert "times as large" not in notes[-1]
 
 
 def test_a_layer_over_the_character_bakes_as_it_is(tmp_path, model, foreign):
@@ -75,6 +74,35 @@ def test_a_layer_over_the_character_bakes_as_it_is(tmp_path, model, foreign):
     assert np.linalg.norm(world_points(out, 1.0, "/Groom_2/Bob") - head, axis=1).max() < 0.5
 
 
+def test_parts_in_one_unknown_unit_keep_together(tmp_path):
+    """A braid's few roots alone would be taken for another unit."""
+    rng, files = np.random.default_rng(0), []
+    for name, spread in (("head", 45.0), ("braid", 2.0)):  # mm
+        points = rng.normal(0, spread, (40, 3))
+        files.append(put(tmp_path, f"{name}.tfx", tressfx_text(points, [2] * 20)))
+    both, notes = import_groom(files, tmp_path / "both.usda")
+    (alone,), _ = import_groom(files[1], tmp_path / "alone.usda")
+    size = [np.ptp(groom.points, axis=0).max() for groom in (*both, alone)]
+    assert size[0] > 15 * size[1] and size[2] > 5 * size[1]
+    assert not any("unit" in note for note in notes)
+
+
+def test_a_range_that_the_character_lacks_is_not_made_up(tmp_path):
+    """It would hide the animation that the character gets later."""
+    out = grow("bob", BODY, tmp_path / "grown.usda", count=20, with_character=True)
+    assert not Usd.Stage.Open(str(out)).HasAuthoredTimeCodeRange()
+
+
+def test_a_name_that_the_shot_lists_may_be_grown_if_nothing_lies_over_the_shot(tmp_path):
+    shot = write_shot(tmp_path, Recipe(bound="mesh"))
+    layer = Sdf.Layer.FindOrOpen(str(shot))
+    layer.subLayerPaths.append("./later.usda")
+    layer.Save()
+    grow("bob", shot, tmp_path / "later.usda", count=5)
+    with pytest.raises(NeuralocksError, match="later.usda"):
+        grow("bob", shot, tmp_path / "later.usda", count=5, with_character=True)
+
+
 def test_what_cannot_be_put_on_a_head_is_refused(tmp_path, foreign):
     shot = write_shot(tmp_path, Recipe(bound="none"))
     before = shot.read_bytes()
@@ -85,6 +113,7 @@ def test_what_cannot_be_put_on_a_head_is_refused(tmp_path, foreign):
         (foreign, {"character": shot}, "a character with skin"),
         (few, {"character": BODY}, "fewer than 4 strands"),
         (foreign, {"with_character": True}, "--with-character: there is no character; name one with --character"),
+        (foreign, {"head": "head"}, "--head: there is no character"),
         (foreign, {"character": tmp_path / "nobody.usda"}, "nobody.usda: no such file"),
     ):
         with pytest.raises(NeuralocksError, match=said):
