@@ -15,7 +15,7 @@ import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 
 FOLDER = Path(sys.argv[-1])
-TAB, LIVE = 130, 318
+TAB, LIVE = 130, 341
 """How far below the top of the sidebar the third tab and the Live button are."""
 state = {}
 
