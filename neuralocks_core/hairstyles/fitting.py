@@ -17,8 +17,6 @@ FEWEST = 4
 """Roots that determine a sphere."""
 OFF = 0.2
 """A root this far off the sphere, relative to its radius, such as that of a tail's hair tie, does not count."""
-
-
 DOUBT = 0.12
 """Largest share by which the radius of a head may be in doubt: whole heads of hair have 0.05 to 0.09, fringes and tails 0.2."""
 
@@ -89,7 +87,7 @@ def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:
     for _ in range(4):
         design = np.concatenate([2 * used, np.ones((len(used), 1))], axis=1)
         x = np.linalg.lstsq(design, np.square(used).sum(1), rcond=None)[0]
-        centre, radius = x[:3], float(np.sqrt(x[3] + np.square(x[:3]).sum()))
+        centre, radius = x[:3], float(np.sqrt(max(x[3] + np.square(x[:3]).sum(), 0.0)))
         near = _near(points, centre, radius)
         if near.sum() < FEWEST:
             break
