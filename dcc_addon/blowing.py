@@ -6,13 +6,12 @@ from neuralocks_core.wind import Wind
 from .services.wind import Blowing
 
 
-def blowing(armature) -> Blowing | None:
-    """The wind as a bake takes it; None for a calm."""
+def blowing(armature) -> Blowing:
+    """The wind as a bake takes it."""
     own = armature.neuralocks_character
     return Blowing.of(own.wind, own.wind_direction, own.gusts)
 
 
 def in_core(armature) -> Wind | None:
-    """The same in the core's axes."""
-    found = blowing(armature)
-    return found and found.in_core()
+    """The same in the core's axes; None for a calm."""
+    return blowing(armature).in_core()

@@ -20,7 +20,7 @@ class Look(NamedTuple):
     motion: float
     resolve: bool
     model: str
-    blowing: Blowing | None
+    blowing: Blowing
 
 
 def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
@@ -58,5 +58,5 @@ def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
 def _look(hair) -> Look:
     settings = hair.neuralocks_hair
     path = model_path(hair)
-    wind = blowing(settings.armature) if load_model(path).feels_wind else None
+    wind = blowing(settings.armature) if load_model(path).feels_wind else Blowing()
     return Look(tuple(material_words(settings)), typed(settings, MOTION.name), settings.resolve, path, wind)

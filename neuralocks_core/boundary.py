@@ -170,7 +170,7 @@ class BoundarySampler:
     def _blown(self, wind: Wind, turns: np.ndarray, times: np.ndarray) -> np.ndarray:
         """What a wind adds to `_history`, with the head's rotations at times (n, L)."""
         check_felt(self.spec.feels_wind)
-        push = wind.at(times[:, :-2], self.clip.end - self.clip.start if self.clip.loop else 0.0) / G
+        push = wind.at(times[:, :-2], self.clip.period) / G
         rows = np.zeros((*push.shape[:2], self.spec.per_bin))
         rows[..., :3] = np.einsum("nkji,nkj->nki", turns[:, :-2, 0], push)
         return self._binned(rows)

@@ -42,7 +42,7 @@ class ClipSpline:
         clip, base = self._clip, self._clip.wrapped(times)
         beyond = (times - base)[:, None]
         if clip.loop:
-            moved = np.round(beyond / max(clip.end - clip.start, 1e-9)) * self._drift
+            moved = np.round(beyond / max(clip.period, 1e-9)) * self._drift
         else:
             moved = np.minimum(beyond, 0) * self._speed
         return self._spline(base), moved
@@ -53,7 +53,7 @@ def _extended(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
     if not clip.loop or len(clip.times) < 3:
         return clip.times, clip.joints
     pad = min(len(clip.times) - 1, 8)
-    period = clip.end - clip.start
+    period = clip.period
     drift = np.zeros((clip.joints.shape[1], 4, 4))
     drift[:, :3, 3] = clip.joints[-1, :, :3, 3] - clip.joints[0, :, :3, 3]
     times = np.concatenate([clip.times[-1 - pad : -1] - period, clip.times, clip.times[1 : 1 + pad] + period])

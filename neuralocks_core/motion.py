@@ -80,6 +80,11 @@ class Clip:
         return float(self.times[-1])
 
     @property
+    def period(self) -> float:
+        """Time after which the motion repeats [s]; 0 if it does not."""
+        return self.end - self.start if self.loop else 0.0
+
+    @property
     def parts(self) -> list[Clip]:
         """The clip from each cut up to the next; the clip itself if there is none."""
         if self.loop or not len(self.cuts):
@@ -121,9 +126,9 @@ class Clip:
         """
         if np.isnan(times).any():
             raise NeuralocksError("times: hold NaN; give seconds")
-        if self.loop and self.end > self.start:
+        if self.period > 0:
             inside = (times >= self.start) & (times <= self.end)
-            return np.where(inside, times, self.start + np.mod(times - self.start, self.end - self.start))
+            return np.where(inside, times, self.start + np.mod(times - self.start, self.period))
         return np.clip(times, self.start, self.end)
 
     def _bracket(self, times):

@@ -135,7 +135,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
                     material=list(look.material),
                     strength=look.motion,
                     resolve=look.resolve,
-                    **(look.blowing._asdict() if look.blowing else {}),
+                    **look.blowing._asdict(),
                     loop=sampled.clip.loop,
                     progress=say,
                 )

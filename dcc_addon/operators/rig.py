@@ -129,7 +129,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name), share=0.5)
         bones = bind(named(name), sampled).bones  # reports what is wrong before anything is written
-        if wind and bones.model.feels_wind:
+        if bones.model.feels_wind:
             options |= wind._asdict()
         head, loop = sampled.character.skeleton.names[sampled.character.head], sampled.clip.loop
         with undone_on_failure(out, shot):

@@ -127,7 +127,7 @@ def _from(start: float, character, strands, clip, times, material, wind: Wind | 
         dt=STEP,
         neighbours=lock_mates(strands.rest, strands.lock),
         bind_body=bind,
-        wind=wind and wind.at(clock, clip.end - clip.start if clip.loop else 0.0),
+        wind=wind and wind.at(clock, clip.period),
         **options,
     )
     return _between(clock, rollout.points, times) - strands.rest

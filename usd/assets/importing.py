@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, UsdGeom, Vt
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.files import as_path
 from neuralocks_core.formats.look import Look
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
@@ -72,8 +72,10 @@ def import_groom(
         found += read
         notes += told
     if rig:
-        found, told = _put_on(rig, found, resize=unit is None)
-        notes.append(f"{', '.join(map(str, sources))}: {told}")
+        subject = ", ".join(map(str, sources))
+        with about(subject):
+            found, told = _put_on(rig, found, resize=unit is None)
+        notes.append(f"{subject}: {told}")
     over = Over(rig, as_path(character, "character")) if rig and with_character else None
     write_grooms(out, found, rig and rig.border, over)
     return [each.groom for each in found], notes

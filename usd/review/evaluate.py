@@ -256,8 +256,7 @@ class _Subject:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
         runs = [(a - 1, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
         runs = [(a, b) for a, b in runs if times[b] - times[a] >= 0.5]
-        wind = recorded_wind(self.item.prim, self.item.attachment.rig.border)
-        if not runs or (wind and wind.gusts):  # in gusts, no hair comes to rest
+        if not runs or (self._wind and self._wind.gusts):  # in gusts, no hair comes to rest
             return {"settling_s": float("nan"), "jitter_mm": float("nan")}
         moved_before = [(a, b) for a, b in runs if a > 0] or runs
         a, b = max(moved_before, key=lambda run: times[run[1]] - times[run[0]])
@@ -279,19 +278,17 @@ class _Subject:
         if not clip.loop:
             begun = max(min(times[0], clip.start), begun)
         known = np.concatenate([[begun], times])
-        rig, prim = self.item.attachment.rig, self.item.prim
-        wind = recorded_wind(prim, rig.border)
-        if wind and not clip.loop:
+        if self._wind and not clip.loop:
             known[0] -= comparison.BLOWN
-        felt = {"wind": wind, "volume": recorded_volume(prim)}
+        felt = {"wind": self._wind, "volume": recorded_volume(self.item.prim)}
         true = comparison.simulated(self.character, some, clip, known, material, **felt, progress=self.say)[1:]
-        answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few, wind)}
+        answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
         answers["rigid"] = np.zeros_like(true)
         rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}
         tips = {who: metrics.tip_curves(a) for who, a in answers.items() if a is not None}
         return rows, tips | {"reference": metrics.tip_curves(true)}
 
-    def _held(self, material: Material, model: StrandModel | None, few, wind: Wind | None) -> np.ndarray | None:
+    def _held(self, material: Material, model: StrandModel | None, few) -> np.ndarray | None:
         """The model's answer for each pose as if it were held, in the wind, if there is a model."""
         if model is None:
             return None
@@ -299,8 +296,13 @@ class _Subject:
         sampler = model.sampler(self.character, self._clip)
         ratios = material.log_ratios()
         session.anchor(sampler.held_bind(ratios))
-        vectors = sampler.vectors(self.baked.times, ratios, 0.0, wind=wind if model.feels_wind else None)
+        vectors = sampler.vectors(self.baked.times, ratios, 0.0, wind=self._wind if model.feels_wind else None)
         return np.stack([session.displacement(vector)[few] for vector in vectors])
+
+    @cached_property
+    def _wind(self) -> Wind | None:
+        """That the bake was made in."""
+        return recorded_wind(self.item.prim, self.item.attachment.rig.border)
 
     @cached_property
     def _clip(self) -> Clip:

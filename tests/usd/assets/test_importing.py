@@ -111,7 +111,7 @@ def test_what_cannot_be_put_on_a_head_is_refused(tmp_path, foreign):
     )
     for source, wrong, said in (
         (foreign, {"character": shot}, "a character with skin"),
-        (few, {"character": BODY}, "fewer than 4 strands"),
+        (few, {"character": BODY}, "few.usda: groom: has fewer than 4 strands"),
         (foreign, {"with_character": True}, "--with-character: there is no character; name one with --character"),
         (foreign, {"head": "head"}, "--head: there is no character"),
         (foreign, {"character": tmp_path / "nobody.usda"}, "nobody.usda: no such file"),

@@ -13,6 +13,7 @@ from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_vector
+from neuralocks_core.wind import Wind
 from tests.strand_models import write_random_model
 from usd.models.export import export_model
 from usd.skel.clip_codes import CLOSE, STAND
@@ -86,3 +87,21 @@ def test_a_rig_is_fed_as_its_description_says(tmp_path):
     relative = np.stack([head.T @ neck, head.T @ chest])[None]
     ours = model.evaluate(held_features(model.spec, relative, (head.T @ [0, -1, 0])[None]))
     assert turns == pytest.approx(ours, abs=1e-5)
+
+
+def test_the_winds_of_a_bake_are_described_for_others(tmp_path):
+    """Computed from the words alone; a model that feels none has no words for it."""
+    export_model(model_file.shipped("strands"), tmp_path)
+    told = json.loads((tmp_path / "description.json").read_text("utf-8"))["sliders"]["wind"]
+    share = float(re.search(r"level vector ([\d.]+) times", told)[1])
+    said = re.search(r"c ([\d., ]+), f ([\d., ]+) Hz, phases ([\d., ]+) and ([\d., ]+) rad", told)
+    c, f, along, across = (np.array(part.split(", "), float) for part in said.groups())
+    wind, t = Wind((1.0, -2.0, 3.0), 0.7), np.linspace(0, 9, 50)[:, None]
+    a, b = ((c * np.sin(2 * np.pi * f * t + phase)).sum(axis=1)[:, None] for phase in (along, across))
+    m, side = np.array(wind.mean), np.array([3.0, 0.0, -1.0])
+    s = share * np.linalg.norm(m) * side / np.linalg.norm(side)
+    assert m + 0.7 * (a * m + b * s) == pytest.approx(wind.at(t[:, 0]), abs=1e-9)
+    for static in (BoundarySpec(bins=()), BoundarySpec(linear="velocity")):
+        path = write_random_model(tmp_path / "held.neuralocks", gain=1.0, spec=static)
+        export_model(path, tmp_path / "held")
+        assert "wind" not in json.loads((tmp_path / "held" / "description.json").read_text("utf-8"))["sliders"]
