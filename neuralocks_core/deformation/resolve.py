@@ -10,7 +10,7 @@ import numpy as np
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.near_body import NearBody, PosedBody
 from neuralocks_core.character import Character
-from neuralocks_core.deformation.laying import SLACK, clearance, resolved, rest_distance
+from neuralocks_core.deformation.laying import MARGIN, SLACK, clearance, resolved, rest_distance
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.skinned_body import Body
@@ -26,6 +26,8 @@ BATCH = 2048
 """Strands checked together."""
 PUSHED = 1024
 """Strands pushed together."""
+WORN = 0.01
+"""A root deeper in the body than this [m] is not on its skin, but under something worn."""
 
 
 def reach(character: Character, strands: StrandSet) -> float:
@@ -119,6 +121,24 @@ class Resolver:
         self._push(displacement, joints, shape, each)
         if self._size != 1:
             displacement *= self._size
+
+    def freed(self) -> np.ndarray:
+        """Displacement (S, 24, 3) float32 [m], canonical, that lays strands over the body that they rest in. Their roots stay, and
+        so does hair under something worn.
+        """
+        moved = np.zeros_like(self._rest)
+        if self.body is None:
+            return moved
+        body = self._posed(self.character.skeleton.bind, self._constant, *_corners(self._rest))
+        for some in range(0, len(moved), PUSHED):
+            rows = slice(some, some + PUSHED)
+            points = self._rest[rows]
+            distance = rest_distance(points, body)
+            inside = (distance[:, 1:] < 0).any(axis=1) & (distance[:, 0] > -WORN) & self.strands.valid[rows]
+            clear = np.where(inside[:, None], np.float32(MARGIN), np.full_like(distance, -np.inf))
+            clear[:, 0] = -np.inf
+            moved[rows] = resolved(points, body, clear) - points
+        return moved * self._size
 
     def _push(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None, each: Callable) -> None:
         rest, clear = self._rest, self.clear

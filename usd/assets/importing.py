@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, UsdGeom, Vt
 
+from neuralocks_core.deformation.freeing import freed
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.files import as_path
 from neuralocks_core.formats.look import Look
@@ -103,15 +104,19 @@ def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]
 
 
 def _put_on(rig: StageRig, found: list[Authored], resize: bool) -> tuple[list[Authored], str]:
-    """The hair on a character's head, in bind world, and how it was put there."""
+    """The hair on a character's head and out of its body, in bind world, and how it was put there."""
     fitted = Barber(rig.character).fitted([each.groom for each in found], resize)
+    grooms, laid = zip(*(freed(groom, rig.character) for groom in fitted.grooms), strict=True)
+    laid, on = np.concatenate(laid), [replace(each, groom=groom) for each, groom in zip(found, grooms)]
     size = f", made {fitted.scale:.3g} times as large" if resize else ""
     middle, most = 1e3 * np.median(fitted.moved), 1e3 * fitted.moved.max()
-    on = [replace(each, groom=groom) for each, groom in zip(found, fitted.grooms)]
-    return on, (
+    told = (
         f"put on the head of {rig.path}{size}; strands were moved by {middle:.0f} mm in the median, {most:.0f} mm at most, "
         "so that their roots lie on its skin"
     )
+    if (laid > 1e-3).any():
+        told += f", and {(laid > 1e-3).sum()} that went into the body were laid over it, by {1e3 * laid.max():.0f} mm at most"
+    return on, told
 
 
 def _primvars(look: Look) -> tuple[Primvar, ...]:

@@ -141,7 +141,8 @@ def test_real_hair_lies_on_another_head_and_bakes(tmp_path, names, model):
     for groom in grooms:
         used = groom.counts > 0
         assert np.abs(body.distance(groom.points[groom.starts[used]], limit=0.1)[0]).max() < 1e-4
+        assert (body.distance(groom.points, limit=0.01)[0] < -0.003).mean() < 1e-3
     paths = [f"/Groom/{Path(name).name}" for name in names]
     out = bake(tmp_path / "real.usda", tmp_path / "hair.usdc", model, grooms=paths, frames="70:72").path
     card = evaluate(out, grooms=paths)
-    assert all(card.grooms[path]["inside_at_rest_percent"] < 20 for path in paths)
+    assert all(card.grooms[path]["inside_at_rest_percent"] < 6 for path in paths)  # roots lie on the skin

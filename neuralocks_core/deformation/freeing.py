@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair that was made for another head, taken out of the body on which it is put."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from neuralocks_core.character import Character
+from neuralocks_core.deformation.carrier import Carrier
+from neuralocks_core.deformation.resolve import Resolver
+from neuralocks_core.groom import Groom
+from neuralocks_core.motion import Clip
+from neuralocks_core.strands.strand_set import strands_on
+
+
+def freed(groom: Groom, character: Character) -> tuple[Groom, np.ndarray]:
+    """The groom with strands that rest in the body laid over it, every edge's length kept, and how far each was moved (S,) [m].
+
+    A bake cannot do this: it must leave hair that rests in the body where its author has put it.
+
+    Args:
+        groom: in bind-world metres, its roots on the skin.
+        character: whose body it is.
+    """
+    strands = strands_on(character, groom)
+    displacement = Resolver(character, strands, _shrug(character)).freed()
+    points = Carrier(groom, strands).carry(displacement)
+    return replace(groom, points=points), np.linalg.norm(displacement, axis=2).max(axis=1, initial=0.0)
+
+
+def _shrug(character: Character) -> Clip:
+    """A motion of all but the head, so that only the head is looked up in a grid: one of the whole body takes long to build."""
+    bind, others = character.skeleton.bind, ~character.skeleton.below(character.carrying_joint)
+    moved = bind.copy()
+    moved[others, 1, 3] -= character.times_human
+    return Clip([0.0, 1.0], [bind, moved], np.zeros((2, len(character.body.shapes) if character.body else 0)))

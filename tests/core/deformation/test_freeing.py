@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair that is put on a head and goes into the body is laid over it; all other hair stays as it is, bit for bit."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.deformation.freeing import freed
+from neuralocks_core.groom import Groom
+from neuralocks_core.skinned_body import Body
+from tests.core import rigs
+
+RADIUS = 0.1
+BALL = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
+
+
+def standing(size: float, worn: float = 0.0) -> Character:
+    """A ball for a head on a larger ball, for a person `size` times as large; `worn` [m] is the thickness of a helmet."""
+    place = np.diag([size, size, size, 1.0])
+    bind = place @ rigs.bind() @ np.linalg.inv(place)
+    middle, count = bind[rigs.HEAD, :3, 3], len(BALL.vertices)
+    head, trunk = (1 + worn / RADIUS) * BALL.vertices, 2 * BALL.vertices - [0, 0.28, 0]
+    points, faces = size * np.concatenate([head, trunk]) + middle, np.concatenate([BALL.faces, BALL.faces + count])
+    joints = np.repeat([[rigs.HEAD], [0]], count, axis=0)
+    return Character(Skeleton(rigs.NAMES, rigs.PARENTS, bind), Body(points, faces, joints, np.ones((2 * count, 1))))
+
+
+def hanging(size: float, vertices: int) -> np.ndarray:
+    """Strands (40, vertices, 3) [m] from the sides of the head straight down into the ball below, and above it one that stands up."""
+    around, down = np.linspace(0, 2 * np.pi, 39), np.linspace(0, 0.25, vertices)
+    roots = RADIUS * np.stack([np.cos(around), 0 * around, np.sin(around)], axis=-1)
+    points = roots[:, None] - down[:, None] * [0, 1, 0]
+    up = RADIUS * np.array([[[0, 1, 0]]]) + 0.3 * down[:, None] * [0, 1, 0]
+    return size * np.concatenate([points, up])
+
+
+@pytest.mark.parametrize("vertices", [24, 60])
+@pytest.mark.parametrize("size", [1.0, 40.0])
+def test_hair_that_hangs_into_shoulders_lies_on_them(size, vertices):
+    character = standing(size)
+    body, own = Collider(character.body.points, character.body.triangles), hanging(size, vertices)
+    points = (own + character.skeleton.bind[rigs.HEAD, :3, 3]).astype(np.float32)
+    groom = Groom("Hair", points.reshape(-1, 3), np.full(40, vertices))
+    laid, moved = freed(groom, character)
+    after = laid.points.reshape(points.shape)
+    assert body.distance(points[:-1], limit=np.inf)[0].min() < -0.03 * size
+    assert body.distance(after[:, 1:], limit=np.inf)[0].min() > -2e-4 * size
+    np.testing.assert_array_equal(after[:, 0], points[:, 0])
+    np.testing.assert_array_equal(after[-1], points[-1])
+    assert moved[-1] == 0 and moved[:-1].min() > 0.02 * size
+    length = [np.linalg.norm(np.diff(each.astype(float), axis=1), axis=2).sum(axis=1) for each in (after, points)]
+    np.testing.assert_allclose(*length, rtol=1e-4)
+
+
+def test_hair_under_a_helmet_stays_there():
+    character = standing(1.0, worn=0.02)
+    points = (hanging(1.0, 24) + character.skeleton.bind[rigs.HEAD, :3, 3]).astype(np.float32)
+    groom = Groom("Hair", points.reshape(-1, 3), np.full(40, 24))
+    laid, moved = freed(groom, character)
+    assert not moved.any() and np.array_equal(laid.points, groom.points)
