@@ -13,6 +13,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.formats.look import Look
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
+from neuralocks_core.progress import Progress, silent, within
 
 from ..border.damage import names_damage
 from ..border.placement import Placement
@@ -27,6 +28,9 @@ from .groom import Authored, Over, write_grooms
 from .grow import Barber
 from .prims import Spline
 
+_READ, _LAID = 400, 950
+"""Progress, in thousandths of the work, once the files are read and once the hair is on the head and out of the body."""
+
 
 def import_groom(
     source,
@@ -38,6 +42,7 @@ def import_groom(
     skeleton: str | None = None,
     head: str | None = None,
     with_character: bool = False,
+    progress: Progress | None = None,
 ) -> tuple[list[Groom], list[str]]:
     """Read hair files (TressFX, .hair, .data, .bin, USD curves) and write them as USD grooms.
 
@@ -50,6 +55,7 @@ def import_groom(
             given, it gets the head's size, too.
         skeleton, head: as for `bake`.
         with_character: write a layer over the character's file, which can be opened and baked as it is.
+        progress: called with (done, total, message).
 
     Returns:
         The grooms, and what a user should know.
@@ -62,21 +68,25 @@ def import_groom(
     for option, value in (("with-character", with_character), ("skeleton", skeleton), ("head", head)):
         if value and character is None:
             raise NeuralocksError(f"--{option}: there is no character; name one with --character")
+    say = progress or silent
     if character is not None:
+        say(0, 1000, "looking at the head")
         rigs = read_rigs(character, skeleton, head)
         rig = rigs[0]
         (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
         notes += [*first_of(rigs), *rig.notes, *unlikely_head(rig)]
     counted = unit if unit is not None else _common_unit(sources, rig is not None)
-    for path in sources:
+    for number, path in enumerate(sources):
+        say((_READ if rig else _LAID) * number // len(sources), 1000, f"reading {path.name}")
         read, told = _read(path, out, counted, up)
         found += read
         notes += told
     if rig:
         subject = ", ".join(map(str, sources))
         with about(subject):
-            found, told = _put_on(rig, found, resize=unit is None)
+            found, told = _put_on(rig, found, unit is None, within(say, _READ, _LAID))
         notes.append(f"{subject}: {told}")
+    say(_LAID, 1000, f"writing {out.name}")
     over = Over(rig, as_path(character, "character")) if rig and with_character else None
     write_grooms(out, found, rig and rig.border, over)
     return [each.groom for each in found], notes
@@ -103,11 +113,16 @@ def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]
     return [Authored(groom, beside=Beside(_primvars(look)))], notes
 
 
-def _put_on(rig: StageRig, found: list[Authored], resize: bool) -> tuple[list[Authored], str]:
+def _put_on(rig: StageRig, found: list[Authored], resize: bool, say: Progress) -> tuple[list[Authored], str]:
     """The hair on a character's head and out of its body, in bind world, and how it was put there."""
-    fitted = Barber(rig.character).fitted([each.groom for each in found], resize)
-    grooms, laid = zip(*(freed(groom, rig.character) for groom in fitted.grooms), strict=True)
-    laid, on = np.concatenate(laid), [replace(each, groom=groom) for each, groom in zip(found, grooms)]
+    say(0, len(found), "putting it on the head")
+    fitted, on, laid = Barber(rig.character).fitted([each.groom for each in found], resize), [], []
+    for number, (each, groom) in enumerate(zip(found, fitted.grooms)):
+        say(number, len(found), f"taking {groom.name} out of the body")
+        groom, moved = freed(groom, rig.character)
+        on.append(replace(each, groom=groom))
+        laid.append(moved)
+    laid = np.concatenate(laid)
     size = f", made {fitted.scale:.3g} times as large" if resize else ""
     middle, most = 1e3 * np.median(fitted.moved), 1e3 * fitted.moved.max()
     told = (

@@ -39,10 +39,13 @@ def import_command(
     """Write hair files as USD grooms, as they are or on the head of a character."""
     from ..assets.importing import import_groom
     from ..review.inspect import groom_facts
+    from .progress import progress_bar
 
-    grooms, notes = import_groom(
-        files, out, unit, up, character=character, skeleton=skeleton, head=head, with_character=with_character
-    )
+    with progress_bar("importing") as progress:
+        grooms, notes = import_groom(
+            files, out, unit, up,
+            character=character, skeleton=skeleton, head=head, with_character=with_character, progress=progress,
+        )  # fmt: skip
     note(notes)
     if as_json:
         print_json({"path": str(out), "grooms": [groom_facts(g) for g in grooms], "notes": notes})
