@@ -23,14 +23,7 @@ def freed(groom: Groom, character: Character) -> tuple[Groom, np.ndarray]:
         character: whose body it is.
     """
     strands = strands_on(character, groom)
-    displacement = Resolver(character, strands, _shrug(character)).freed()
+    unshaped = np.zeros((1, len(character.body.shapes) if character.body else 0))
+    displacement = Resolver(character, strands, Clip([0.0], character.skeleton.bind[None], unshaped)).freed()
     points = Carrier(groom, strands).carry(displacement)
     return replace(groom, points=points), np.linalg.norm(displacement, axis=2).max(axis=1, initial=0.0)
-
-
-def _shrug(character: Character) -> Clip:
-    """A motion of all but the head, so that only the head is looked up in a grid: one of the whole body takes long to build."""
-    bind, others = character.skeleton.bind, ~character.skeleton.below(character.carrying_joint)
-    moved = bind.copy()
-    moved[others, 1, 3] -= character.times_human
-    return Clip([0.0, 1.0], [bind, moved], np.zeros((2, len(character.body.shapes) if character.body else 0)))

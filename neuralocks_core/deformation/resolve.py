@@ -18,6 +18,8 @@ from neuralocks_core.strands.strand_set import CLAMPED, StrandSet
 
 STILL = 1e-3
 """Skin that moves by less than this relative to the head [m] counts as still."""
+HEAD = 0.999
+"""Skin with at least this share of its weights on the joint that carries the hair, and those below it, is the head's."""
 STEP, ROOM = 0.1, 0.1
 """The ball that hair can reach is enlarged [m]: to the next multiple of STEP, plus ROOM."""
 DEEP = 0.02
@@ -213,8 +215,8 @@ def _corners(points: np.ndarray) -> np.ndarray:
 
 
 def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
-    """Which vertices (V,) move by less than STILL relative to the head, by a bound from each joint's largest motion, and are
-    moved by no blend shape.
+    """Which vertices (V,) of the head move by less than STILL relative to it, by a bound from each joint's largest motion, and are
+    moved by no blend shape. Those of a trunk that stands still do not count: a grid around all of it takes seconds to build.
     """
     shift = turn = np.zeros(len(character.skeleton.names))
     for joints in clip.joints:
@@ -224,6 +226,8 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
     far = np.linalg.norm(character.canonical(body.points), axis=1)
     each = turn[body.joint_indices] * far[:, None] + shift[body.joint_indices]
     still = np.sum(body.joint_weights * each, axis=1) < STILL * character.times_human
+    head = character.skeleton.below(character.carrying_joint)
+    still &= np.sum(body.joint_weights * head[body.joint_indices], axis=1) > HEAD
     for offsets, varies in zip(body.shapes.values(), np.ptp(clip.shape, axis=0) > 1e-6):
         if varies:
             still &= ~(np.abs(offsets) > 1e-5).any(axis=1)

@@ -85,7 +85,7 @@ def bake(
     blown = as_wind(wind, gusts)
     check_felt(blown is None or strand_model.feels_wind)
     cuts = given_cuts(cuts, loop)
-    shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, progress)
+    shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
     inputs = {"model": _digest(strand_model), "material": asdict(look), "wind": blown and asdict(blown)}
 

@@ -6,7 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
+from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
 from ..shot.notes import asked_notes, out_of_place
@@ -36,11 +38,17 @@ class BakeResult:
 
 
 def read_asked(
-    shot, grooms, skeleton, head, joints, cuts, frames, subframes: int, progress: Progress | None
+    shot, grooms, skeleton, head, joints, cuts, frames, subframes: int, wind: Wind | None, progress: Progress | None
 ) -> tuple[Shot, list[float]]:
     """The shot, read if it is not yet, and the time codes asked for; arguments as for `bake`."""
     (progress or silent)(0, 1, "reading the shot")  # for a crowd, this takes longer than a user waits without a message
-    shot = shot if isinstance(shot, Shot) else read_shot(shot, grooms, skeleton, head, joints, cuts)
+    if not isinstance(shot, Shot):
+        shot = read_shot(shot, grooms, skeleton, head, joints, cuts, still=wind is not None)
+    if frames is None and shot.first == shot.last and not any(rig.source.animated for rig in shot.rigs):
+        raise NeuralocksError(
+            f"{shot.path}: has neither an animation nor a range of frames; name those in which the wind blows with "
+            "--frames FIRST:LAST"
+        )
     return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
 
 

@@ -75,7 +75,7 @@ def simulate(
     check_number("--volume", volume, 0, STIFFEST_VOLUME)
     blown = as_wind(wind, gusts)
     cuts = given_cuts(cuts, loop)
-    shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, progress)
+    shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
     options = {"volume": float(volume), "loop": loop}
     inputs = {"strands": count, "material": asdict(look), "wind": blown and asdict(blown), "codes": codes, **options}
 

@@ -64,7 +64,7 @@ def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, jo
         NeuralocksError: what stops a bake of the shot.
     """
     runner = StrandModel(model_file.read(model, "strands"))
-    read, written = read_shot(shot, grooms, skeleton, head, joints), {}
+    read, written = read_shot(shot, grooms, skeleton, head, joints, still=True), {}
     names = file_names([item.path for item in read.grooms])
     for name, item in zip(names, read.grooms, strict=True):
         arrays, joints = tables(item, runner)

@@ -92,7 +92,7 @@ class Baked:
 
 
 def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Baked:
-    """Read a bake of any tool: a stage with an animated skeleton and grooms whose points are sampled over time.
+    """Read a bake of any tool: a stage with a skeleton and grooms whose points are sampled over time.
 
     Arguments are as for `bake`; a joint that the user named as the head is recorded in the bake. If some grooms have samples, those
     without are left out, with a note.
@@ -100,13 +100,13 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
     Raises:
         NeuralocksError: it cannot be read, or no groom has samples.
     """
-    shot = read_shot(path, grooms, skeleton, head, joints)
+    shot = read_shot(path, grooms, skeleton, head, joints, still=True)
     if head is None and (head := _named_head(shot)):
-        shot = read_shot(path, grooms, skeleton, head, joints)
+        shot = read_shot(path, grooms, skeleton, head, joints, still=True)
     told = [(item.attachment.rig.path, recorded_cuts(item.prim)) for item in shot.grooms]
     told = {path: cuts for path, cuts in told if cuts is not None}
     if told:
-        shot = read_shot(path, grooms, skeleton, head, joints, told)
+        shot = read_shot(path, grooms, skeleton, head, joints, told, still=True)
     sampled = {item.path: UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples() for item in shot.grooms}
     if not any(sampled.values()):
         raise NeuralocksError(

@@ -111,7 +111,10 @@ def not_animated(rig: StageRig) -> str:
     """Why a skeleton cannot be baked; if UsdSkel ignores its animation, also what is wrong with the animation."""
     ignored = rig.source.ignored
     why = f" ({ignored.split(': ', 1)[1].split(';')[0]})" if ignored else ""
-    return f"{rig.path}: the skeleton has no animation{why}; bind a SkelAnimation to it (skel:animationSource)"
+    return (
+        f"{rig.path}: the skeleton has no animation{why}; bind a SkelAnimation to it (skel:animationSource), or let a wind "
+        "blow (--wind X,Y,Z)"
+    )
 
 
 def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:

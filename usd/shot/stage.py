@@ -95,7 +95,9 @@ class Shot:
 
 
 @names_damage
-def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None, cuts=None) -> Shot:
+def read_shot(
+    path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None, cuts=None, still: bool = False
+) -> Shot:
     """Read a shot for a bake.
 
     Args:
@@ -106,6 +108,7 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         joints: semantic joint -> joint (path, or its last part), if names are not enough.
         cuts: time codes at which every character is suddenly elsewhere and its hair starts anew, or a dictionary of them by
             skeleton path; detected if None.
+        still: also read the hair of characters without an animation.
 
     Raises:
         NeuralocksError: what stops a bake, with the prim and the remedy.
@@ -119,7 +122,8 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         raise no_groom(stage, path)
     rigs, unusable = _rigs(stage, border, skeleton, head, path, joints=joints, cuts=cuts)
     notes += unusable
-    _check_animated(rigs)
+    if not still:
+        _check_animated(rigs)
     check_cuts(cuts, rigs)
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
     others = None
@@ -134,12 +138,13 @@ def read_shot(path, grooms=None, skeleton: str | None = None, head: str | None =
         nothing = f"{skeleton}: carries no groom; choose another skeleton, or name the groom"
         raise NeuralocksError((*no_hair, *search.nobodys(), nothing)[0])
     notes += no_hair + search.off_heads() + search.of_others()
-    if not grooms:
+    if not (grooms or still):
         found = _moving(found, notes)
     every = rigs if others is None else [*rigs, *others.maybe_same()]
     used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))
     for rig in used:
-        _check_animated([rig])
+        if not still:
+            _check_animated([rig])
         notes += rig.notes + lies_down(rig) + partial_body(rig, every)
     notes += without_body(used, every)
     for item in found:

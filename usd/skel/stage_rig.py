@@ -87,6 +87,8 @@ class StageRig:
             turn[self.character.skeleton.below(joint)] = 0
         start, end = self.time_codes[[0, -1]]
         notes = []
+        if len(self.time_codes) < 2:
+            return [f"{self.path}: has no animation, whose length a loop would have; gusts do not repeat"]
         if turn.max() > LOOP_GAP:
             # Joints below a joint turn with it, up to rounding: the first of them is the cause.
             name = self.source.names[int(np.flatnonzero(turn > turn.max() - 0.1)[0])]

@@ -54,6 +54,23 @@ def wind_in_strands(folder: Path) -> None:
     assert max(apart(points_at(strands, f), calm[f]) for f in frames) == 0.0
 
 
+def wind_on_a_bust(folder: Path) -> None:
+    """A character without an animation: its hair moves in gusts, live as in a bake."""
+    rig = scenes.armature()
+    strands, frames = scenes.hair(rig, 40), (20, 3, 12)
+    make_live(rig, strands)
+    own = rig.neuralocks_character
+    own.wind, own.gusts = 6.0, 1.0
+    shown = {f: points_at(strands, f) for f in frames}
+    assert not messages(), messages()
+    assert min(apart(shown[a], shown[b]) for a, b in ((20, 3), (3, 12))) > 1e-5
+    needs_usd()
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 24
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "bust.usdc")) == {"FINISHED"}
+    for f in frames:
+        assert apart(baked_points(folder / "bust.usdc", "/Character/Hair_Hair", f), shown[f]) < SAME, f
+
+
 def wind_in_bones(folder: Path) -> None:
     """Live, keyed and exported hair bones agree in a wind; a network for held poses stays as it is, and the panel says so."""
     needs_usd()

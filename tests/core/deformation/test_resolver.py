@@ -20,27 +20,34 @@ from neuralocks_core.strands.strand_set import strand_set
 from tests.core import rigs
 from tests.core.deformation.ball_hair import HEAD, strands
 
+NAMES, PARENTS = (*rigs.NAMES, f"{rigs.NAMES[rigs.HEAD]}/chin"), (*rigs.PARENTS, rigs.HEAD)
+CHIN = len(rigs.NAMES)
+"""A joint of the head that turns with the neck: what is on it moves relative to a head that turns."""
+
 
 def test_a_resolver_serves_clips_in_which_the_same_skin_stands_still():
     """Another clip of an edited animation gets the same results as with its own resolver, bit for bit."""
-    mesh, person = trimesh.creation.icosphere(subdivisions=2, radius=0.1), rigs.person()
-    ball, count = person.skeleton.bind[person.head, :3, 3] + mesh.vertices, len(mesh.vertices)
+    mesh, skeleton = (
+        trimesh.creation.icosphere(subdivisions=2, radius=0.1),
+        Skeleton(NAMES, PARENTS, with_chin(rigs.bind())),
+    )
+    ball, count = rigs.bind()[rigs.HEAD, :3, 3] + mesh.vertices, len(mesh.vertices)
     body = Body(
         np.concatenate([ball, ball - [0, 0.15, 0]]),
         np.concatenate([mesh.faces, mesh.faces + count]),
-        np.repeat([[person.head], [0]], count, axis=0),
+        np.repeat([[rigs.HEAD], [CHIN]], count, axis=0),
         np.ones((2 * count, 1)),
         {"wide": np.full((2 * count, 3), 0.01)},
     )
-    character = Character(person.skeleton, body)
-    points = strands() + person.skeleton.bind[person.head, :3, 3]
+    character = Character(skeleton, body)
+    points = strands() + rigs.bind()[rigs.HEAD, :3, 3]
     groom = Groom("Hair", points.reshape(-1, 3), np.full(60, 24))
     hair = strand_set(groom, groom.points[0], character.head_centre, character.facing)
     times = np.arange(5) / 24
 
     def clip(shape=0.0, **motion):
         made = rigs.moved(times, **motion)
-        return Clip(times, made.joints, np.full((5, 1), shape))
+        return Clip(times, with_chin(made.joints), np.full((5, 1), shape))
 
     def turn(t):
         return from_vector(np.stack([0 * t, 3 * t, 0 * t], axis=-1))
@@ -55,6 +62,11 @@ def test_a_resolver_serves_clips_in_which_the_same_skin_stands_still():
         one.apply(moved, run.joints[3], run.shape[3])
         results.append(moved)
     assert np.array_equal(*results) and np.abs(results[0] - 0.01).max() > 0.02, "nothing was pushed"
+
+
+def with_chin(joints):
+    """Transforms (..., 6, 4, 4) of the humanoid with one that goes where its neck goes (..., 7, 4, 4)."""
+    return np.concatenate([joints, joints[..., 2:3, :, :]], axis=-3)
 
 
 def test_the_grooms_of_a_head_share_its_grid():
@@ -127,14 +139,14 @@ def pushed(size, nods):
     bind = place @ rigs.bind() @ np.linalg.inv(place)
     ball, count = bind[rigs.HEAD, :3, 3] + size * mesh.vertices, len(mesh.vertices)
     below, faces = ball - [0, 0.15 * size, 0], np.concatenate([mesh.faces, mesh.faces + count])
-    joint, weight = np.repeat([[rigs.HEAD], [0]], count, axis=0), np.ones((2 * count, 1))
-    body = Body(np.concatenate([ball, below]), faces, joint, weight)
+    joint, weight = np.repeat([[rigs.HEAD], [CHIN]], count, axis=0), np.ones((2 * count, 1))
+    body, bind = Body(np.concatenate([ball, below]), faces, joint, weight), with_chin(bind)
     joints = np.tile(bind, (3, 1, 1, 1))
     joints[:, rigs.HEAD, :3, :3] = from_vector(np.outer(times, [4.0 * nods, 0, 0]))
     points = strands().reshape(-1, 3) + rigs.bind()[rigs.HEAD, :3, 3]
     hair = strand_set(Groom("Hair", points, np.full(60, 24)), rigs.bind()[rigs.HEAD, :3, 3], np.zeros(3))
     hair = replace(hair, rest=hair.rest * np.float32(size), length=hair.length * np.float32(size))
-    resolver = Resolver(Character(Skeleton(rigs.NAMES, rigs.PARENTS, bind), body), hair, Clip(times, joints))
+    resolver = Resolver(Character(Skeleton(NAMES, PARENTS, bind), body), hair, Clip(times, joints))
     moved = np.full((60, 24, 3), 0.01 * size, np.float32)
     resolver.apply(moved, joints[2])
     return moved, resolver
@@ -168,3 +180,27 @@ def test_what_hardly_moves_on_a_person_stands_still_on_a_giant(size):
     """Half a millimetre of a person."""
     resolver = pushed(size, 0.005)[1]
     assert not len(resolver._near.head.moving)
+
+
+def test_a_trunk_that_stands_still_is_not_part_of_the_heads_grid():
+    """A grid around both would take seconds to build, and have no room left for the details of a face."""
+    mesh, count = trimesh.creation.icosphere(subdivisions=2, radius=0.1), 162
+    ball = mesh.vertices + rigs.bind()[rigs.HEAD, :3, 3]
+    body = Body(
+        np.concatenate([ball, ball - [0, 0.3, 0]]),
+        np.concatenate([mesh.faces, mesh.faces + count]),
+        np.repeat([[rigs.HEAD], [1]], count, axis=0),
+        np.ones((2 * count, 1)),
+    )
+    origin = rigs.bind()[rigs.HEAD, :3, 3]
+    hair = strand_set(Groom("Hair", strands(turn=0.5).reshape(-1, 3) + origin, np.full(60, 24)), origin, np.zeros(3))
+    resolver = Resolver(Character(rigs.person().skeleton, body), hair, Clip([0.0], rigs.bind()[None]))
+    outside = (resolver.at_rest.distance(hair.rest)[0] > 0).all(axis=1)
+    assert resolver._near.head.cell == 0.005 and resolver._near.head._values.shape[1] < 60
+    moved = np.zeros((60, 24, 3), np.float32)
+    moved[:, 2:] = -0.5 * hair.rest[:, 2:] * [1, 0, 1]
+    pulled = hair.rest + moved
+    resolver.apply(moved, rigs.bind())
+    before, after = (resolver.at_rest.distance(points)[0][outside, 2:] for points in (pulled, hair.rest + moved))
+    assert outside.mean() > 0.5
+    assert before.min() < -0.01 and after.min() > -1e-3

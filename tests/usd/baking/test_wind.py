@@ -15,6 +15,7 @@ from usd.baking.join import join
 from usd.baking.simulate import simulate
 from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
+from usd.review.picture import preview
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair
 from usd.shot.recorded import KEY
@@ -115,6 +116,22 @@ def test_a_loop_ends_in_the_wind_that_it_begins_in(tmp_path, model):
     first, second, last = (world_points(out, code) for code in (codes[0], codes[1], codes[-1]))
     assert last == pytest.approx(first, abs=1e-5)
     assert np.abs(second - first).max() > 1e-4
+
+
+def test_wind_moves_the_hair_of_a_character_without_an_animation(tmp_path, model):
+    """As on a bust; its bake can be measured and drawn like others."""
+    shot, out = write_shot(tmp_path, Recipe(frames=0)), tmp_path / "blown.usdc"
+    with pytest.raises(NeuralocksError, match=r"no animation; bind .*, or let a wind blow \(--wind X,Y,Z\)"):
+        bake(shot, out, model, frames="1:9")
+    with pytest.raises(NeuralocksError, match="neither an animation nor a range of frames; .*--frames FIRST:LAST"):
+        bake(shot, out, model, wind=(3, 0, 0))
+    assert not out.exists()
+    result = bake(shot, out, model, frames="1:9", wind=(6, 0, 0), gusts=1, loop=True)
+    assert [note for note in result.notes if "gusts do not repeat" in note]
+    assert len(result.frames) == 9
+    assert np.abs(np.diff([world_points(out, code) for code in (1.0, 5.0, 9.0)], axis=0)).max() > 1e-5
+    assert evaluate(out).grooms[HAIR]["stretch_percent"] < 0.01
+    assert preview(out, tmp_path / "blown.png", size=(60, 80)).exists()
 
 
 def test_hair_that_feels_no_wind_refuses_it(tmp_path):

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The files of a shot's grooms for other runtimes; what they hold is tested with the example that reads them."""
 
+import numpy as np
 import pytest
 
 from neuralocks_core import model as model_file
 from neuralocks_core.runtime import StrandModel
-from usd.models.groom_tables import file_names, tables
+from usd.models.groom_tables import export_grooms, file_names, tables
 from usd.shot.stage import read_shot
 
 from ..shots import Recipe, write_shot
@@ -16,6 +17,16 @@ def test_the_size_of_a_head_is_the_same_in_any_unit(tmp_path, model):
     for unit in (1.0, 0.01):
         (groom,) = read_shot(write_shot(tmp_path, Recipe(unit=unit), f"{unit}")).grooms
         assert tables(groom, runner)[0]["size"] == pytest.approx(1)
+
+
+def test_a_character_need_not_be_animated(tmp_path, model):
+    """An engine animates it."""
+    held = []
+    for frames in (0, 9):
+        shot = write_shot(tmp_path, Recipe(frames=frames), f"{frames}")
+        told = export_grooms(shot, model, lambda name, frames=frames: tmp_path / f"{frames}_{name}")
+        held.append(dict(np.load(tmp_path / f"{frames}_{next(iter(told))}")))
+    assert all(np.array_equal(held[0][name], held[1][name]) for name in held[1])
 
 
 def test_no_disk_takes_two_grooms_files_for_one():
