@@ -3,10 +3,12 @@
 
 import ast
 import importlib
+import itertools
 import os
 import shutil
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -25,7 +27,8 @@ if mode == "number": print(5); print("null"); print(json.dumps({"done": 0.75, "m
 if mode == "killed": print("a warning", file=sys.stderr, flush=True); os.kill(os.getpid(), 9)
 if mode == "early":
     print(json.dumps({"done": 0, "message": "first"}), flush=True)
-    for before in (0.0, 0.5): time.sleep(0.4); print(json.dumps({"before": before}), flush=True)
+    while not os.path.exists(settings["out"] + ".go"): time.sleep(0.01)
+    for before in (0.0, 0.5): print(json.dumps({"before": before}), flush=True)
     time.sleep(60)
 if mode == "fail":
     print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
@@ -70,13 +73,15 @@ def test_training_runs_beside_and_says_how_far_it_is(job):
     assert running.succeeded and running.message == "more"
 
 
-def test_what_comes_before_the_training_counts_too(job, monkeypatch):
+def test_what_comes_before_the_training_counts_too(job, monkeypatch, tmp_path):
+    reports = itertools.count(step=8.0)  # eight seconds between any two
+    monkeypatch.setattr(time_left, "time", SimpleNamespace(monotonic=lambda: next(reports)))
     running = job("early")
-    running._before = time_left.TimeLeft(after=0.0)
     _wait(lambda: running.message == "first")
     assert running.seconds_left == 900
+    (tmp_path / "early.go").touch()
     _wait(lambda: running.seconds_left > 900)
-    assert 900.2 < running.seconds_left < 960
+    assert running.seconds_left == 908
 
 
 def test_training_is_cancelled_at_once(job):

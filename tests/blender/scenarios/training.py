@@ -201,19 +201,21 @@ def _told(until) -> str:
 
 
 def _in_training(folder: Path, notes=(), before: str = ""):
-    """Hair of a saved file for which a training runs for a second; it copies a model, and does something first."""
+    """Hair of a saved file for which a training runs until `_ended` is called; it copies a model, and does something first."""
     from dcc_addon.operators import training as operator
     from dcc_addon.services import training_job
 
+    (folder / "go").unlink(missing_ok=True)
     child = folder / "child.py"
     child.write_text(
-        "import json, shutil, sys, time\n"
+        "import json, pathlib, shutil, sys, time\n"
         "settings = json.load(sys.stdin)\n"
         "assert open(settings['character'], 'rb').read(8) == b'PXR-USDC'\n"
         "print(json.dumps({'done': 0.5, 'message': 'half'}), flush=True)\n"
         f"print(json.dumps({{'notes': {list(notes)!r}}}), flush=True)\n"
         f"{before or 'pass'}\n"
-        "time.sleep(1)\n"
+        "go, end = pathlib.Path(settings['out']).with_name('go'), time.monotonic() + 60\n"
+        "while not go.exists() and time.monotonic() < end: time.sleep(0.02)\n"
         f"shutil.copy({MODEL!r}, settings['out'])\n"
     )
     check = folder / "check.py"
@@ -239,6 +241,7 @@ def _ended() -> tuple[str, bool]:
     from dcc_addon.operators import training as operator
     from dcc_addon.session import session
 
+    Path(operator.job().out).with_name("go").touch()
     end = time.monotonic() + 60
     while operator.finish() is None and time.monotonic() < end:
         time.sleep(0.1)

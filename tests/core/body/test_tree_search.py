@@ -7,6 +7,8 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import Future
+from traceback import walk_stack
 
 import numpy as np
 import pytest
@@ -30,17 +32,31 @@ def test_the_threads_find_what_one_finds(count, k, monkeypatch):
 def test_ctrl_c_waits_for_the_threads(monkeypatch):
     """Else they go on in memory that is given back."""
     monkeypatch.setattr(os, "cpu_count", lambda: 3)
-    ended = []
+    main = threading.main_thread().ident
+    heard, ended = threading.Event(), []
+
+    def press():
+        """When all threads search, and the first one waits for what they find."""
+        while Future.result.__code__ not in [frame.f_code for frame, _ in walk_stack(sys._current_frames()[main])]:
+            time.sleep(0.01)
+        signal.pthread_kill(main, signal.SIGINT)
+
+    all_search = threading.Barrier(3, press)
+
+    def hear(*_):
+        heard.set()
+        raise KeyboardInterrupt
 
     class Slow:
         def query(self, points, k):
-            time.sleep(0.5)
+            all_search.wait()
+            heard.wait()
+            time.sleep(0.2)  # in which a search that does not wait is over
             ended.append(len(points))
             return np.zeros(len(points)), np.zeros(len(points), int)
 
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    before = signal.signal(signal.SIGINT, hear)
     try:
-        threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
         with pytest.raises(KeyboardInterrupt):
             search(Slow(), np.zeros((3 * SHARE, 3)))
     finally:
@@ -56,8 +72,8 @@ from neuralocks_core.hairstyles.obstacle import _to_surface
 signal.signal(signal.SIGINT, signal.default_int_handler)
 rng = np.random.default_rng(1)
 body, grid = rng.uniform(size=(20_000, 3)), rng.uniform(size=(400_000, 3))
-threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
+    threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     while True:  # a fast machine is done with one before the signal comes
         _to_surface(grid, body, np.arange(19_998).reshape(-1, 3))
 except KeyboardInterrupt:

@@ -176,8 +176,10 @@ main()""".replace("PRESS", press.format("os.kill(os.getpid(), signal.SIGINT)"))
 def test_ctrl_c_pressed_again_tells_no_traceback():
     """Threads that still compute are waited for after the command, by Python itself."""
     code = """import os, signal, sys, threading, time
+main_thread = threading.main_thread().ident
 def press():
-    time.sleep(0.3)
+    while sys._current_frames()[main_thread].f_code is not threading._shutdown.__code__:
+        time.sleep(0.01)
     os.kill(os.getpid(), signal.SIGINT)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from usd.__main__ import main
