@@ -5,7 +5,6 @@ import importlib.util
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -50,18 +49,19 @@ def test_large_grooms_are_written_in_blocks_that_leave_no_trace(tmp_path, model,
 
 
 def test_a_killed_bake_leaves_nothing_and_goes_on(tmp_path, model):
-    shot = write_shot(tmp_path, Recipe(frames=30, strands=2000, vertices=16))
-    out = tmp_path / "bake.usdc"
+    shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
     whole = bake(shot, out, model).path.read_bytes()
     out.unlink()
-    command = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(out), "--model", str(model)]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
     spool = tmp_path / ".bake.usdc.baking"
-    while len(list(spool.glob("*.frame"))) < 3 and process.poll() is None:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    assert not out.exists() and spool.exists(), "the bake was over before it could be killed"
+    code = f"""import os, signal
+from pathlib import Path
+from usd.baking.bake import bake
+def killed(*_):
+    if len(list(Path({str(spool)!r}).glob("*.frame"))) >= 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+bake({str(shot)!r}, {str(out)!r}, {str(model)!r}, progress=killed)"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT)
+    assert done.returncode == -signal.SIGKILL and not out.exists() and spool.exists()
     result = bake(shot, out, model)
     assert result.resumed >= 3
     assert out.read_bytes() == whole
@@ -166,16 +166,22 @@ def test_a_stopped_bake_goes_on_to_a_file_that_tells_how_it_was_made_now(tmp_pat
 
 
 def test_ctrl_c_tells_that_the_same_command_goes_on(tmp_path, model):
-    shot, out = write_shot(tmp_path, Recipe(frames=300, strands=2000, vertices=16)), tmp_path / "bake.usdc"
-    command = [sys.executable, "-m", "usd", "bake", str(shot), "-o", str(out), "--model", str(model)]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    while len(list(tmp_path.glob(".bake.usdc.baking/*.frame"))) < 3 and process.poll() is None:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
-    said = process.communicate()[1]
-    assert process.returncode == 130 and not out.exists(), "the bake was over before it could be stopped"
-    done = len(list(tmp_path.glob(".bake.usdc.baking/*.frame")))
-    assert said.endswith(f"note: the same command continues from here, with {done} frames done\nstopped\n")
+    shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
+    code = """import os, signal
+from usd.__main__ import main
+from usd.baking.spool import Spool, kept
+signal.signal(signal.SIGINT, signal.default_int_handler)
+write = Spool.write
+def pressed(spool, *frame):
+    write(spool, *frame)
+    if kept(spool.out) == 3:
+        os.kill(os.getpid(), signal.SIGINT)
+Spool.write = pressed
+main()"""
+    words = ["bake", str(shot), "-o", str(out), "--model", str(model)]
+    done = subprocess.run([sys.executable, "-c", code, *words], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 130 and not out.exists() and kept(out) == 3
+    assert done.stderr.endswith("note: the same command continues from here, with 3 frames done\nstopped\n")
 
 
 @pytest.mark.parametrize("save_every", [1, 1 << 30])
