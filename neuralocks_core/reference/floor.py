@@ -39,6 +39,7 @@ def stateless_floor(
     history: int,
     every: int = 10,
     truth: np.ndarray | None = None,
+    wind: np.ndarray | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Floor:
@@ -49,7 +50,7 @@ def stateless_floor(
     times that of a simulation.
 
     Args:
-        rest, head, body, triangles, material: as in `simulate`.
+        rest, head, body, triangles, material, wind: as in `simulate`.
         history: frames of motion that the method may see.
         every: compare every n-th frame, from `history` on.
         truth: (T, S, K, 3) points of `simulate` over the whole clip, if available.
@@ -65,7 +66,7 @@ def stateless_floor(
             f"head: {count} frames for a history of {history} looked at every {every}; give a longer clip"
         )
     if truth is None:
-        truth = simulate(rest, head, body, triangles, material, **options).points
+        truth = simulate(rest, head, body, triangles, material, wind=wind, **options).points
     if body is not None and options.get("bind_body") is None:
         # else each restart would measure the rest distances on its own first pose
         first = np.asarray(head[0], float)
@@ -74,8 +75,8 @@ def stateless_floor(
     forgetful = np.empty((len(frames), *np.shape(rest)), np.float32)
     for i, frame in enumerate(frames):
         span = slice(frame - history, frame + 1)
-        near = None if body is None else body[span]
-        forgetful[i] = simulate(rest, head[span], near, triangles, material, **options).points[-1]
+        near, blown = (None if each is None else each[span] for each in (body, wind))
+        forgetful[i] = simulate(rest, head[span], near, triangles, material, wind=blown, **options).points[-1]
         if progress:
             progress(i + 1, len(frames), "restarting")
     length = np.linalg.norm(np.diff(rest, axis=1), axis=-1).sum(1)

@@ -31,6 +31,17 @@ def test_restarts_measure_rest_on_the_body_at_rest():
     assert floor.rms == pytest.approx(told.rms, rel=1e-4)
 
 
+def test_wind_blows_in_restarts_as_it_does_in_the_clip():
+    """Each restart in the wind of its own frames."""
+    rest, head = groom(4, curl=0), np.tile(np.eye(4), (45, 1, 1))
+    wind = np.zeros((45, 3))
+    wind[:30, 0], wind[30:, 2] = 4.0, 4.0
+    floor = stateless_floor(rest, head, wind=wind, history=30, every=10)
+    assert floor.position_percent < 0.5
+    calm = stateless_floor(rest, head, truth=simulate(rest, head, wind=wind).points, history=30, every=10)
+    assert calm.position_percent > 10 * floor.position_percent
+
+
 def test_short_clip_is_refused():
     with pytest.raises(NeuralocksError, match="longer"):
         stateless_floor(groom(2), shaken(10), history=20)
