@@ -15,6 +15,11 @@ class CannotWrite(NeuralocksError):
     """The file system refuses, such as a full disk: the input is fine, and finished work is worth keeping."""
 
 
+def fact_of(error: BaseException) -> str:
+    """What another library's error says, in one line; its type if it says nothing."""
+    return (str(error).strip() or type(error).__name__).splitlines()[0]
+
+
 @contextmanager
 def about(subject):
     """Prefix errors raised in this block with the subject, such as the path of the file being read."""

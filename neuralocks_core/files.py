@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from neuralocks_core.errors import CannotWrite, NeuralocksError
+from neuralocks_core.errors import CannotWrite, NeuralocksError, fact_of
 
 _HOLDS_OPEN_FILES = os.name == "nt"
 _PAUSES = (0.05, 0.2, 0.5)
@@ -204,5 +204,5 @@ def cannot_write(path: str | os.PathLike, error: OSError) -> CannotWrite:
         return CannotWrite(f"{path}: there is a file, not a folder, on the way; choose another folder")
     if _HOLDS_OPEN_FILES and isinstance(error, PermissionError) and os.path.exists(path):
         return CannotWrite(f"{path}: cannot be written; close the program that has it open, or choose another name")
-    fact = error.strerror or (str(error) or type(error).__name__).splitlines()[0]
+    fact = error.strerror or fact_of(error)
     return CannotWrite(f"{path}: cannot be written ({fact}); choose a folder you can write to")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, fact_of
 from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.shortcomings import shortcomings
 
@@ -147,7 +147,7 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
         RuntimeError,
         RecursionError,
     ) as error:
-        raise NeuralocksError(f"{path}: damaged or not a model ({_first_line(error)}); get an undamaged copy") from None
+        raise NeuralocksError(f"{path}: damaged or not a model ({fact_of(error)}); get an undamaged copy") from None
     return ModelFile(path, meta, graphs)
 
 
@@ -165,7 +165,7 @@ def _parsed(text: bytes):
     try:
         return json.loads(text)
     except ValueError as error:  # not UTF-8, not JSON, or a number with thousands of digits
-        raise zipfile.BadZipFile(_first_line(error)) from None
+        raise zipfile.BadZipFile(fact_of(error)) from None
 
 
 def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes:
@@ -180,9 +180,7 @@ def _entry(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> bytes
         with archive.open(info) as file:
             return file.read(info.file_size + 1)
     except zlib.error as error:
-        raise NeuralocksError(
-            f"{path}: {info.filename} is damaged ({_first_line(error)}); get an undamaged copy"
-        ) from None
+        raise NeuralocksError(f"{path}: {info.filename} is damaged ({fact_of(error)}); get an undamaged copy") from None
 
 
 def _check(meta, path: Path, kind: str | None) -> None:
@@ -204,7 +202,3 @@ def _check(meta, path: Path, kind: str | None) -> None:
         raise NeuralocksError(
             f"{path}: it is a model for {names[meta['kind']]}, not for {names[kind]}; give one that is"
         )
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error) or type(error).__name__).splitlines()[0]

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, fact_of
 
 OPSET = 17
 IR_VERSION = 8
@@ -98,4 +98,4 @@ class OnnxWeights:
                 for node in gemms
             }
         except (DecodeError, ValueError, TypeError, KeyError, IndexError) as error:
-            raise NeuralocksError(f"{name}: damaged ({str(error).splitlines()[0]}); get an undamaged copy") from None
+            raise NeuralocksError(f"{name}: damaged ({fact_of(error)}); get an undamaged copy") from None

@@ -16,7 +16,7 @@ from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
-from neuralocks_core.errors import NeuralocksError, about
+from neuralocks_core.errors import NeuralocksError, about, fact_of
 from neuralocks_core.measures import another_body, known_body
 from neuralocks_core.motion import Clip
 from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND
@@ -227,7 +227,7 @@ def graph_session(file: model_file.ModelFile, name: str):
 
 
 def _fact(error: Exception) -> str:
-    return (str(error) or type(error).__name__).splitlines()[0].rsplit("Status Message: ", 1)[-1][:120]
+    return fact_of(error).rsplit("Status Message: ", 1)[-1][:120]
 
 
 def _named(values: dict[str, int]) -> str:

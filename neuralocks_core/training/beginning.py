@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from neuralocks_core import model
 from neuralocks_core.boundary_spec import BoundarySpec
-from neuralocks_core.errors import NeuralocksError, about
+from neuralocks_core.errors import NeuralocksError, about, fact_of
 from neuralocks_core.network_sizes import K
 from neuralocks_core.onnx_graph import OnnxWeights
 from neuralocks_core.training import checkpoint
@@ -148,9 +148,8 @@ class Beginning:
             with torch.no_grad():
                 yield
         except (KeyError, ValueError, RuntimeError) as error:
-            fact = str(error).splitlines()[0]
             raise NeuralocksError(
-                f"{self.path}: its network is built differently from this one ({fact}); begin with another"
+                f"{self.path}: its network is built differently from this one ({fact_of(error)}); begin with another"
             ) from None
 
 
