@@ -89,7 +89,10 @@ def another_body(character: Character, shape: np.ndarray, learned) -> str:
     lowest, highest = bounds
     measures = body_measures(character, shape)
     far = far_off(measures, lowest, highest)
-    return "".join(f"{MEASURES[i]} {measures[i]:.3g} m (trained: {lowest[i]:.3g} to {highest[i]:.3g})" for i in far[:1])
+    if not len(far):
+        return ""
+    worst = far[0]
+    return f"{MEASURES[worst]} {measures[worst]:.3g} m (trained: {lowest[worst]:.3g} to {highest[worst]:.3g})"
 
 
 def known_body(character: Character, shape: np.ndarray | None, learned) -> bool:

@@ -23,6 +23,8 @@ SETTLED = 0.1
 HELD = 1e-5
 """Transforms that change by less than this in HELD_TIME [s] belong to a held pose."""
 HELD_TIME = 1 / 24
+QUIET_AFTER = 2.0
+"""A pose held for this long [s] should have still hair."""
 
 
 def strand_lengths(points: np.ndarray, counts: np.ndarray) -> np.ndarray:

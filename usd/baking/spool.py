@@ -230,8 +230,8 @@ def fingerprint(files, values: dict) -> str:
     facts = []
     for file in sorted(map(str, files)):
         try:
-            stat = os.stat(file)
-            facts.append([file, stat.st_size, stat.st_mtime_ns])
+            found = os.stat(file)
+            facts.append([file, found.st_size, found.st_mtime_ns])
         except OSError:
             facts.append([file, -1, -1])
     return hashlib.sha256(json.dumps([facts, values], sort_keys=True).encode()).hexdigest()

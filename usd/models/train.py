@@ -52,7 +52,7 @@ def train(
         grooms: USD files, or "library".
         motion: BVH or USD files.
         out: `.neuralocks` file to write.
-        settings: fields of `training.regression.RegressionOptions`, or of `training.moment_options.SelfSupervisedOptions`;
+        settings: fields of `training.regression_options.RegressionOptions`, or of `training.moment_options.SelfSupervisedOptions`;
             values may be words.
         method: "rollouts" of the solver, or "selfsupervised" as in the paper.
         paper: with "selfsupervised", use what the paper states, including its boundary history, unless `settings` say otherwise.

@@ -30,8 +30,9 @@ from ..shot.motion_notes import motion_notes
 from ..shot.notes import few, first_of, unfound, unlikely_head, without_turn
 from ..shot.rig_controls import is_closed
 from ..shot.skeletons import read_each_rig
-from ..shot.stage import StageRig, read_rigs
+from ..shot.stage import read_rigs
 from ..skel.source import find_skeletons
+from ..skel.stage_rig import StageRig
 from ..skel.surface import bound_skeleton
 
 LIBRARY = "library"

@@ -43,8 +43,6 @@ COLLISION_FRAMES, DEEPEST_FRAMES = 32, 3
 """Frames in which distances to the body are measured: the former evenly over the bake, the latter where hair seems deepest."""
 COLLISION_VERTICES, COLLISION_POINTS = 200_000, 6_400_000
 """Most of the groom's own vertices that are measured, evenly along the strands, and most positions of them in all frames."""
-SETTLED = 2.0
-"""A pose held for this long [s] should have still hair."""
 
 
 @names_damage
@@ -260,7 +258,7 @@ class _Subject:
             return {"settling_s": float("nan"), "jitter_mm": float("nan")}
         moved_before = [(a, b) for a, b in runs if a > 0] or runs
         a, b = max(moved_before, key=lambda run: times[run[1]] - times[run[0]])
-        quiet = [np.flatnonzero((times >= times[a] + SETTLED) & (times <= times[b])) for a, b in runs]
+        quiet = [np.flatnonzero((times >= times[a] + metrics.QUIET_AFTER) & (times <= times[b])) for a, b in runs]
         quiet = [frames for frames in quiet if len(frames) > 1]
         return {
             "settling_s": metrics.settling_time(self.moved[a : b + 1], times[a : b + 1], times[a]),

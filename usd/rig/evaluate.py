@@ -28,8 +28,6 @@ FRAMES = 48
 """Frames in which distances to the body are measured, evenly over the animation."""
 ROUNDING = 0.01
 """Less than this [mm] counts as no swing and no depth."""
-SETTLED = 2.0
-"""A pose held for this long [s] should have still hair."""
 
 
 @dataclass(frozen=True)
@@ -158,12 +156,12 @@ class _Posed:
 
 def _moved(posed: _Posed, moving: np.ndarray, say) -> tuple[np.ndarray, float, dict[int, np.ndarray]]:
     """Mean squared distances (V,) [m^2] of vertices from where they would be carried rigidly; the largest step [mm] of any
-    where all other joints have been still for SETTLED, NaN if they never are; and the vertices (2, V, 3) of the rows in
+    where all other joints have been still for `metrics.QUIET_AFTER`, NaN if they never are; and the vertices (2, V, 3) of the rows in
     which distances to the body are measured. Other vertices are not kept: a long animation has gigabytes of them.
     """
     clip, total, steps, seen, before = posed.clip, 0.0, [], {}, None
     still = metrics.held(clip.joints[:, ~moving], clip.times)
-    quiet = clip.times - np.maximum.accumulate(np.where(still, -np.inf, clip.times)) >= SETTLED
+    quiet = clip.times - np.maximum.accumulate(np.where(still, -np.inf, clip.times)) >= metrics.QUIET_AFTER
     wanted = set(np.linspace(0, len(clip.times) - 1, min(len(clip.times), FRAMES)).round().astype(int).tolist())
     for row, both in enumerate(posed.each(say)):
         total = total + np.square(both[0] - both[1]).sum(axis=-1)

@@ -12,7 +12,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import NoHairChains, fits
-from neuralocks_core.rig.measuring import placed_chains
+from neuralocks_core.rig.measuring import UNEVEN, placed_chains
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
@@ -221,7 +221,7 @@ def check_orients(source: StageRig, chains: HairChains) -> None:
                 f"{source.path}: hair joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"
             )
         scale = np.linalg.norm(linear, axis=0)
-        if scale.max() > 1.01 * scale.min():
+        if scale.max() > UNEVEN * scale.min():
             raise NeuralocksError(
                 f"{source.path}: hair joint '{name}' is unevenly scaled in bind pose; apply the scale in the rig"
             )
