@@ -179,22 +179,22 @@ class TrainingJob:
     def _listen(self) -> None:
         with self._process.stdout as lines:
             for line in lines:
-                try:
+                with suppress(ValueError, TypeError):  # a library's output, which may be JSON by chance
                     said = json.loads(line)
-                except ValueError:
-                    continue
-                if not isinstance(said, dict):  # a library's output may be JSON by chance
-                    continue
-                if "error" in said:
-                    self.error = str(said["error"])
-                elif "notes" in said:
-                    self.notes = list(dict.fromkeys([*self.notes, *map(str, said["notes"])]))
-                elif "before" in said:
-                    self._before.told(float(said["before"]))
-                else:
-                    self.done = float(said.get("done", self.done))
-                    self._left.told(self.done)
-                    self.message = str(said.get("message", self.message))
+                    if isinstance(said, dict):
+                        self._told(said)
+
+    def _told(self, said: dict) -> None:
+        if "error" in said:
+            self.error = str(said["error"])
+        elif "notes" in said:
+            self.notes = list(dict.fromkeys([*self.notes, *map(str, said["notes"])]))
+        elif "before" in said:
+            self._before.told(float(said["before"]))
+        else:
+            self.done = float(said.get("done", self.done))
+            self._left.told(self.done)
+            self.message = str(said.get("message", self.message))
 
     def _drain(self) -> None:
         with self._process.stderr as lines:

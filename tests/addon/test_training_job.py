@@ -34,6 +34,7 @@ if mode == "fail":
     print(json.dumps({"error": "/Hair: no hair; add some"}), flush=True); sys.exit(1)
 if mode == "odd":
     for stream in (sys.stdout, sys.stderr): stream.buffer.write(b"\\xff\\x81\\n7\\n[1]\\n"); stream.flush()
+    for said in ({"done": "soon"}, {"done": None}, {"before": [1]}, {"notes": 3}): print(json.dumps(said), flush=True)
     print(json.dumps({"done": 0.75}), flush=True); sys.exit("broken: K\xfcche")
 if mode == "crash": raise RuntimeError("boom")
 if mode != "none": open(settings["out"], "w").close()
