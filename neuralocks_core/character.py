@@ -71,6 +71,14 @@ class Skeleton:
         return np.array(result)
 
 
+def levels(parents: np.ndarray) -> list[np.ndarray]:
+    """Joints without a parent, their children, and so on, so that each level is posed at once; parents (J,) come first."""
+    depth = np.zeros(len(parents), int)
+    for joint, parent in enumerate(parents):
+        depth[joint] = depth[parent] + 1 if parent >= 0 else 0
+    return [np.flatnonzero(depth == level) for level in range(depth.max(initial=-1) + 1)]
+
+
 def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
     """Signed scales (n,) of what a joint carries in some samples of an animation; 1 is the size in the bind pose.
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from neuralocks_core.character import levels
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import Mirrored, from_quaternion, inverses, rotation_part, sizes, to_quaternion
 
@@ -73,14 +74,6 @@ def _matrices(translation, rotation, scale) -> np.ndarray:
     return result
 
 
-def _levels(parents: np.ndarray) -> list[np.ndarray]:
-    """Joints without a parent, their children, and so on."""
-    depth = np.zeros(len(parents), int)
-    for joint, parent in enumerate(parents):
-        depth[joint] = depth[parent] + 1 if parent >= 0 else 0
-    return [np.flatnonzero(depth == level) for level in range(depth.max(initial=-1) + 1)]
-
-
 def _turned_back(similar: np.ndarray) -> np.ndarray:
     """Inverses of transforms (..., 4, 4) that rotate, move and scale alike along all axes; a general inverse wakes BLAS threads for
     each 4x4, which in Blender's Python takes a quarter of the time of playing the frames.
@@ -99,7 +92,7 @@ def _store(channels, rows: np.ndarray, joints: np.ndarray, parents: np.ndarray, 
     """
     stored = np.empty((len(joints), len(parents) + 1, 4, 4))
     stored[:, -1] = np.eye(4)  # above a root, whose parent is -1
-    for level in _levels(parents):
+    for level in levels(parents):
         local, above = joints[:, level], parents[level]
         if above[0] >= 0:
             local = (_turned_back if evenly else inverses)(stored[:, above]) @ local
@@ -205,7 +198,7 @@ class Motion:
     def world(self) -> np.ndarray:
         """Joints (T, J, 4, 4) in Blender's world space, from the stored channels."""
         joints = _matrices(self.translation, self.rotation, self.scale)
-        for level in _levels(self.parents)[1:]:
+        for level in levels(self.parents)[1:]:
             joints[:, level] = joints[:, self.parents[level]] @ joints[:, level]
         return joints
 

@@ -114,13 +114,6 @@ class HairChains:
             reach[joint] = max(reach[joint], self.lengths[bone] + end)
         return float(reach[self.roots[chain]])
 
-    def levels(self) -> list[np.ndarray]:
-        """Joints by depth, so that each level is posed at once."""
-        depth = np.zeros(len(self), int)
-        for joint, parent in enumerate(self.parents):
-            depth[joint] = depth[parent] + 1 if parent >= 0 else 0
-        return [np.flatnonzero(depth == level) for level in range(depth.max() + 1)]
-
     def named_as(self, names, below: np.ndarray) -> "HairChains":
         """These chains with their names in another copy of the rig that has another common prefix: a namespace, or an exporter's.
         Returned unchanged if the names are there, or if the prefix is ambiguous.

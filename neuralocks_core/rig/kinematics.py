@@ -8,6 +8,7 @@ multiplies the joint's local bind rotation from the right.
 
 import numpy as np
 
+from neuralocks_core.character import levels
 from neuralocks_core.rig.chains import HairChains
 
 
@@ -27,7 +28,7 @@ def pose_chains(chains: HairChains, turns: np.ndarray) -> tuple[np.ndarray, np.n
     """Turns (B, N, 3, 3) in canonical axes -> rotations G (B, N, 3, 3) from the bind pose and joint positions (B, N, 3) [m]."""
     rotations = np.empty_like(turns)
     positions = np.empty(turns.shape[:2] + (3,), turns.dtype)
-    for level in chains.levels():
+    for level in levels(chains.parents):
         up = chains.parents[level]
         if up[0] < 0:
             rotations[:, level], positions[:, level] = turns[:, level], chains.origins[level]

@@ -9,6 +9,7 @@ a joint from rest (paper eq. 3 with q^0 = 1).
 import numpy as np
 import torch
 
+from neuralocks_core.character import levels
 from neuralocks_core.materials import LINEAR
 from neuralocks_core.motion import G
 from neuralocks_core.rig.rigging import HairRig
@@ -50,8 +51,9 @@ class RigEnergy(torch.nn.Module):
         # Vertices that rest on the skin, or in it, are not pushed.
         keep("margins", np.minimum(material.margin, rest_clearance(rig, rig.points[chosen])))
         self.bone_joint = torch.as_tensor(chains.bone_joint.astype(np.int64))
-        self.levels = [torch.as_tensor(level) for level in chains.levels()]
-        self.ups = [torch.as_tensor(chains.parents[level].astype(np.int64)) for level in chains.levels()]
+        by_depth = levels(chains.parents)
+        self.levels = [torch.as_tensor(level) for level in by_depth]
+        self.ups = [torch.as_tensor(chains.parents[level].astype(np.int64)) for level in by_depth]
         self.order = torch.argsort(torch.cat(self.levels))
 
     def draw(self, rng: np.random.Generator, count: int) -> torch.Tensor:
