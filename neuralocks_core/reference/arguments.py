@@ -10,6 +10,21 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 
 
+def check_settings(dt: float, margin: float, gravity: float, **counts: int) -> None:
+    """What every simulator is told: `counts` are substeps and the like, the others as in `solver.simulate`.
+
+    Raises:
+        NeuralocksError: a number is not finite or out of range.
+    """
+    told = ", ".join(f"{name} {value}" for name, value in counts.items())
+    if not (np.isfinite(dt) and dt > 0) or min(counts.values()) < 1:
+        raise NeuralocksError(f"dt {dt}, {told}: must be positive")
+    if any(count % 1 for count in counts.values()) or not np.isfinite(margin):
+        raise NeuralocksError(f"{told}, margin {margin}: give whole steps, metres")
+    if not 0 <= gravity < np.inf:
+        raise NeuralocksError(f"gravity {gravity}: give 0 or more [m/s^2]; it pulls down, along -Y")
+
+
 def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:
     """bend [m^4/s^2], weight [factor on gravity], damping [1/s] and clumping [1/s^2], each (S,), finite and not negative.
 

@@ -11,7 +11,13 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import COLLISION, MARGIN
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
-from neuralocks_core.reference.arguments import check_body, check_material, check_neighbours, check_wind
+from neuralocks_core.reference.arguments import (
+    check_body,
+    check_material,
+    check_neighbours,
+    check_settings,
+    check_wind,
+)
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 
@@ -94,14 +100,10 @@ def simulate(
     """
     rods = rest_rods(rest, rest_support=rest_support)
     strands, vertices = rods.mass.shape
-    if not (np.isfinite(volume) and volume >= 0):
-        raise NeuralocksError(f"volume {volume}: must be 0 or above")
-    if not (np.isfinite(dt) and dt > 0) or substeps < 1 or iterations < 1:
-        raise NeuralocksError(f"dt {dt}, substeps {substeps}, iterations {iterations}: must be positive")
-    if substeps % 1 or iterations % 1 or not np.isfinite(margin):
-        raise NeuralocksError(
-            f"substeps {substeps}, iterations {iterations}, margin {margin}: give whole steps, metres"
-        )
+    check_settings(dt, margin, gravity, substeps=substeps, iterations=iterations)
+    for name, value in (("volume", volume), ("collision", collision), ("tolerance", tolerance)):
+        if not 0 <= value < np.inf:
+            raise NeuralocksError(f"{name} {value}: must be 0 or above")
     way, frames = head_motion(head, substeps), len(head)
     # relative to the head's first position: far from the world's origin, rounding would dominate
     away = way.origin[0]

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
-from neuralocks_core.reference.arguments import check_body, check_material, check_wind
+from neuralocks_core.reference.arguments import check_body, check_material, check_settings, check_wind
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 from neuralocks_core.reference.solver import SimulatedHair
@@ -51,8 +50,7 @@ def simulate_xpbd(
     Raises:
         NeuralocksError: as `solver.simulate`.
     """
-    if not (np.isfinite(dt) and dt > 0) or substeps < 1:
-        raise NeuralocksError(f"dt {dt}, substeps {substeps}: must be positive")
+    check_settings(dt, margin, gravity, substeps=substeps)
     rods, way, frames = rest_rods(rest, rest_support=rest_support), head_motion(head, substeps), len(head)
     strands, vertices = rods.mass.shape
     hair = _Hair(rods, way, check_material(material, strands), margin, gravity, device)

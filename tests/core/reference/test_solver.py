@@ -153,9 +153,27 @@ def test_substeps_follow_the_same_motion():
         ({"substeps": 1.5}, "substeps 1.5"),
         ({"margin": np.nan}, "margin nan"),
         ({"start": np.full((4, 24, 3), np.nan)}, "start: holds NaN"),
+        ({"tolerance": -1e-3}, "tolerance -0.001"),
+        ({"collision": np.inf}, "collision inf"),
     ],
 )
 def test_errors_name_the_argument(change, word):
     arguments = {"rest": groom(4), "head": np.eye(4)[None]} | change
     with pytest.raises(NeuralocksError, match=word):
         simulate(arguments.pop("rest"), arguments.pop("head"), **arguments)
+
+
+@pytest.mark.parametrize("simulator", [simulate, simulate_xpbd])
+@pytest.mark.parametrize(
+    "change",
+    [{"dt": 0.0}, {"substeps": 0}, {"substeps": 1.5}, {"margin": np.nan}, {"gravity": -9.81}, {"gravity": np.nan}],
+)
+def test_simulators_refuse_the_same_settings(simulator, change):
+    with pytest.raises(NeuralocksError, match=f"{next(iter(change))} {next(iter(change.values()))}"):
+        simulator(groom(4), np.eye(4)[None], **change)
+
+
+def test_hair_without_gravity_stays_as_it_rests():
+    for simulator in (simulate, simulate_xpbd):
+        points = simulator(groom(4), np.tile(np.eye(4), (4, 1, 1)), gravity=0.0).points
+        np.testing.assert_allclose(points, np.broadcast_to(groom(4), points.shape), atol=1e-6)
