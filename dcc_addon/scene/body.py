@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import inverse
 
 from ..services.mirror import mirrored
 from ..services.rig import BodyArrays
@@ -110,9 +111,16 @@ def _mask(block, groups: tuple[str, ...], weights: np.ndarray, count: int):
 
 
 def _mirrored(body: BodyArrays, mesh_object, modifier) -> BodyArrays:
-    way = np.eye(4)
-    if modifier.mirror_object is not None:
-        way = np.linalg.inv(matrix(modifier.mirror_object.matrix_world)) @ matrix(mesh_object.matrix_world)
+    way = back = np.eye(4)
+    if (middle := modifier.mirror_object) is not None:
+        there, here = matrix(middle.matrix_world), matrix(mesh_object.matrix_world)
+        try:
+            way, back = inverse(there) @ here, inverse(here) @ there
+        except NeuralocksError:
+            raise NeuralocksError(
+                f"{mesh_object.name_full}: its modifier '{modifier.name}' mirrors it in '{middle.name_full}', and one of both has "
+                "zero scale; give it a scale above zero"
+            ) from None
     partner = np.arange(len(body.groups))
     if modifier.use_mirror_vertex_groups:
         flipped = [bpy.utils.flip_name(name) for name in body.groups]
@@ -121,7 +129,7 @@ def _mirrored(body: BodyArrays, mesh_object, modifier) -> BodyArrays:
         across = np.eye(4)
         across[axis, axis] = -1
         merge = modifier.merge_threshold if modifier.use_mirror_merge else -1.0
-        body = mirrored(body, np.linalg.inv(way) @ across @ way, partner, merge)
+        body = mirrored(body, back @ across @ way, partner, merge)
     return body
 
 
