@@ -8,7 +8,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
-from neuralocks_core.rotation import transformed
+from neuralocks_core.rotation import inverse, transformed
 
 from ..services.widths import radii
 from . import curves
@@ -164,6 +164,12 @@ def _children(evaluated, system: str) -> np.ndarray:
         for child in range(first, first + len(drawn.child_particles))
         for step in range(steps)
     ]
-    own = transformed(np.array(points).reshape(-1, 3), np.linalg.inv(matrix(evaluated.matrix_world)))
+    try:
+        to_own = inverse(matrix(evaluated.matrix_world))
+    except NeuralocksError:
+        raise NeuralocksError(
+            f"{evaluated.name}: has zero scale, so the children of '{system}' cannot be read; give it a scale above zero"
+        ) from None
+    own = transformed(np.array(points).reshape(-1, 3), to_own)
     found = own.reshape(-1, steps, 3)
     return found[np.ptp(found, axis=1).max(axis=1, initial=0.0) > 0]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Particle hair becomes Curves: as it was groomed, on what it grows on, and as it looks."""
 
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -77,6 +78,9 @@ def particle_systems(_folder: Path) -> None:
     assert settings.display_percentage == 50 and [m.show_render for m in ball.modifiers] == [True, True, False, False]
     refused(convert, "no object of this scene", "type Hair")
     refused(lambda: convert(system="Dust"), "emits particles")
+    ball.scale.x = 0.0
+    refused(partial(convert, system="Fringe"), "zero scale, so the children of 'Fringe' cannot be read")
+    ball.scale.x = 1.0
     assert convert(system="Fringe", children=False) == {"FINISHED"} and len(scene.neuralocks.hair.data.curves) == 10
 
 
