@@ -14,7 +14,7 @@ from neuralocks_core.rig.network import RigModel
 from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
-from ..shot.notes import on_twos, without_turn
+from ..shot.notes import not_animated, on_twos, without_turn
 from ..shot.stage import frame_range
 from .layer import kept_hair
 from .notes import mirrored_notes, rigged_notes
@@ -124,6 +124,8 @@ class BoundHair:
         name = leaf(character.skeleton.names[character.head])
         turned = np.abs((joints[0, carriers] @ character.inverse_bind[carriers])[:, :3, :3] - np.eye(3)).max()
         if min(turned, np.abs(turns[..., 1:]).max()) < STILL:
+            if source.animation is None:
+                raise NeuralocksError(not_animated(rig))
             raise NeuralocksError(
                 f"{rig.path}: its head joint '{name}' is not animated, so the hair would not move; "
                 "animate the skeleton, or name the joint that carries the hair with --head JOINT"

@@ -27,6 +27,23 @@ def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
 
 
+@pytest.mark.parametrize("bound", [True, False], ids=["to a missing prim", "to nothing"])
+def test_a_skeleton_without_an_animation_is_told_to_have_none(tmp_path, bound):
+    """To name another joint with --head would not help."""
+    shot = small_shot(tmp_path / "shot.usda")
+    hair = read_rigged_hair(shot)
+    model, stage = model_for(hair), Usd.Stage.Open(str(shot))
+    animation = hair.source.source.animation.GetPath()
+    if bound:
+        stage.RemovePrim(animation)
+    else:
+        stage.GetPrimAtPath(hair.path).RemoveProperty("skel:animationSource")
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="the skeleton has no animation; bind a SkelAnimation to it"):
+        bake_rig(shot, tmp_path / "out.usda", model)
+    assert not (tmp_path / "out.usda").exists()
+
+
 @pytest.mark.parametrize("first", [float("nan"), float("-inf"), 99.0])
 def test_a_range_that_cannot_be_meant_gives_way_to_the_animations(tmp_path, first):
     shot = small_shot(tmp_path / "shot.usda")
