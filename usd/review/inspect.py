@@ -101,7 +101,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         stops += [str(error) for error in errors] or [str(no_skeleton(stage, Path(path.name)))]
     curves = find_curves(stage)
     told = any(recorded_cuts(prim) is not None for prim in curves)
-    skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils, bool(curves))} for rig in rigs]
+    skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils, bool(curves))} | _how_baked(rig) for rig in rigs]
     read = POSE_JOINTS if curves else RIG_JOINTS
     for rig in rigs:
         stops += without_turn(rig, read)
@@ -165,6 +165,12 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
     return [
         {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)
     ]
+
+
+def _how_baked(rig: StageRig) -> dict:
+    """How hair bones were baked, if they were."""
+    made = recorded(rig.source.animation) if rig.source.animation else {}
+    return {"baked with": made} if made else {}
 
 
 def _height(rig: StageRig) -> float | None:

@@ -21,7 +21,7 @@ from ..border.stopping import check
 from ..border.time_codes import given_cuts
 from ..shot.notes import asked_notes, left_out, out_of_place
 from ..shot.stage import check_cuts
-from ..shot.wind import as_wind, in_core
+from ..shot.wind import as_wind, in_core, wind_facts
 from .bound import BoundHair
 from .layer import MovedHair, write_rig_layer
 from .stage import of_skeleton, read_rigged_hairs
@@ -134,7 +134,8 @@ def bake_rig(
         return MovedHair(one.hair, one.codes, turns)
 
     written = _each(bound, moved, still)
-    animations = write_rig_layer(written, shot, out)
+    facts = {"strength": float(strength), "loop": loop, **wind_facts(blown)}
+    animations = write_rig_layer(written, shot, out, facts)
     late = [text for text in dict.fromkeys([*map(left_out, still), *said]) if text not in notes]
     late += out_of_place(stage, out)
     if tell:

@@ -19,6 +19,7 @@ from neuralocks_core.runtime import cores
 
 from ..border.damage import names_damage
 from ..shot.notes import few
+from ..shot.wind import recorded_wind
 from .notes import chain_notes, rigged_notes
 from .stage import RiggedHair, check_patterns, core_meshes, read_rigged_hair
 
@@ -39,7 +40,7 @@ class RigCard:
         skeleton: its Skeleton prim.
         measures: `joints`, `chains`, `vertices`, `frames`; `swing_mm`: how far vertices are from where they would be carried
             rigidly (root mean square), `swing_most`: the chain that swings most, `swing_most_mm`; `jitter_mm`: the farthest
-            that a vertex goes from one frame to the next once a pose has been held for two seconds, NaN if none is;
+            that a vertex goes from one frame to the next once a pose has been held for two seconds, NaN if none is, or in gusts;
             `body` and `body_rigid`: `metrics.penetration` of the animation and of hair carried rigidly, in `body_frames`
             frames, with `deepest_at` (time code) and `deepest` (chain). Without a body near the hair, these are missing.
         notes: what a user should know.
@@ -112,6 +113,9 @@ def evaluate_rig(
     off, jitter, seen = _moved(posed, moving, say)
     each = {i: float(np.sqrt(off[lock == i].mean())) for i in np.unique(lock)}
     most = max(each, key=each.__getitem__)
+    wind = source.source.animation and recorded_wind(source.source.animation, hair.border)
+    if wind and wind.gusts:  # no hair comes to rest
+        jitter = float("nan")
     measures = {
         "joints": len(rig.chains),
         "chains": len(rig.chains.roots),

@@ -16,6 +16,7 @@ from neuralocks_core.rotation import quaternion_product, relative_to_parents, ro
 from ..baking.header import apply_binding, over_prim, write_header
 from ..border.damage import named
 from ..border.stage_files import refresh_open
+from ..shot.recorded import record
 from ..skel.joints import JointSource
 from ..skel.rig_copy import hair_of, tell_source
 from .stage import BAKED, RiggedHair
@@ -41,13 +42,14 @@ class MovedHair:
         return self.hair.rig.chains.joints
 
 
-def write_rig_layer(characters: list[MovedHair], shot: Path, out: Path) -> list[str]:
+def write_rig_layer(characters: list[MovedHair], shot: Path, out: Path, facts: dict) -> list[str]:
     """Write the layer, completely or not at all.
 
     Args:
         characters: of one shot.
         shot: file that the layer goes over.
         out: file to write.
+        facts: how the bake was made, recorded on each.
 
     Returns:
         path of the new SkelAnimation of each.
@@ -59,6 +61,8 @@ def write_rig_layer(characters: list[MovedHair], shot: Path, out: Path) -> list[
     codes = sorted({code for character in characters for code in character.codes})
     write_header(layer, hair.stage, hair.border, shot, out, codes)
     paths = [_write_animation(layer, character) for character in characters]
+    for path in paths:
+        record(layer.GetPrimAtPath(path), facts)
     _save(layer, out)
     return paths
 

@@ -17,6 +17,7 @@ from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.review.picture import preview
 from usd.rig.bake import bake_rig
+from usd.rig.evaluate import evaluate_rig
 from usd.rig.stage import read_rigged_hair
 from usd.shot.recorded import KEY
 
@@ -169,3 +170,14 @@ def test_wind_moves_the_hair_of_a_head_that_is_held_still(tmp_path):
     notes = bake_rig(shot, tmp_path / "blown.usda", model, wind=(0, 0, -5), gusts=1).notes
     assert not any("held pose" in note for note in notes)
     assert np.abs(np.diff(hair_turns(tmp_path / "blown.usda", [1.0, 9.0, 17.0]), axis=0)).max() > 1e-3
+
+
+def test_a_rig_bake_records_its_wind_and_a_report_calls_no_gust_jitter(tmp_path):
+    shot, out = small_shot(tmp_path / "still.usda", head_moves=False), tmp_path / "blown.usda"
+    model = model_for(read_rigged_hair(shot), dynamic=True)
+    for gusts in (1.0, 0.0):
+        bake_rig(shot, out, model, wind=(0, 0, -5), gusts=gusts, frames="1:96")
+        (told,) = inspect(out)["skeletons"]
+        assert told["baked with"] == {"strength": 1.0, "loop": False, "wind": [0, 0, -5], "gusts": gusts}
+        jitter = evaluate_rig(out).measures["jitter_mm"]
+        assert np.isnan(jitter) if gusts else jitter < 0.01
