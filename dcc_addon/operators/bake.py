@@ -89,11 +89,12 @@ class Baked(NamedTuple):
     prims: dict[str, str]
 
 
-def bake_steps(context, armature, hairs, path: str, undrawn=()):
+def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool = False):
     """Sample, write the shot beside the bake, and bake it; yields (done, total, message), returns what was `Baked`.
 
     This calls the same functions as the command line, on a stage with the numbers of the live view. Hair with a name in `undrawn`
-    is invisible in the file. If another character's hair is in the file, this one's gets another name.
+    is invisible in the file. If another character's hair is in the file, this one's gets another name. If the bake is to be
+    `attached`, or hair plays its file already, it is made for Cycles.
     """
     scene = context.scene
     full = output_path(path)
@@ -117,6 +118,8 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
         if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
             raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
     check_ours([*outs, *map(shot_beside, outs)], is_own)
+    # If hair has velocities, Cycles blurs it along straight lines, and leaves the samples between the frames unread.
+    velocities = subframes == 1 or not (attached or any(attach.players(str(out)) for out in outs))
     sampled = yield from sampling(context, named(character), share=0.5)
     notes += [text for name, text in sampled.hairs_off.items() if any(name in names for _, _, names in groups)]
     baked: dict[str, tuple[str, str]] = {}
@@ -137,6 +140,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=()):
                     resolve=look.resolve,
                     **look.blowing._asdict(),
                     loop=sampled.clip.loop,
+                    velocities=velocities,
                     progress=say,
                 )
             )
@@ -195,7 +199,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
             return any(other != name for other in players) or is_anothers(out, character)
 
         path = untaken(path, label, taken)
-        baked, notes, _ = yield from bake_steps(context, named(character), [named(name)], str(path))
+        baked, notes, _ = yield from bake_steps(context, named(character), [named(name)], str(path), attached=True)
         hair = named(name)
         hair.neuralocks_hair.live = False
         attach.attach(hair, *baked[name], context.scene)

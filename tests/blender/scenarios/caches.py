@@ -190,6 +190,38 @@ def drawn_alike(folder: Path) -> None:
                 assert apart(found, np.stack([smooth.min(axis=0), smooth.max(axis=0)])) < 0.011, kind
 
 
+def blurred_alike(folder: Path) -> None:
+    """Attached hair is blurred like live hair: Cycles draws both where they are between the frames if there are samples, also after
+    a bake over the same file, and otherwise along velocities, which a bake for other programs always has.
+    """
+    needs_usd()
+    if bpy.app.version < (4, 5):
+        raise SkipTest("this Blender reads no velocities of hair")
+    rig, scene, out = scenes.armature(), bpy.context.scene, str(folder / "hair.usdc")
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+
+    def velocities() -> bool:
+        attributes = strands.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
+        return "velocity" in attributes
+
+    assert bpy.ops.neuralocks.bake_attach(filepath=out) == {"FINISHED"} and velocities()
+    scene.neuralocks.subframes = 4
+    assert bpy.ops.neuralocks.detach() == {"FINISHED"}
+    make_live(rig, strands)
+    live = points_at(strands, 9, 0.25)
+    for bake in (bpy.ops.neuralocks.bake_attach, bpy.ops.neuralocks.bake):
+        assert bake(filepath=out) == {"FINISHED"}
+        assert apart(points_at(strands, 9, 0.25), live) < SAME
+        assert not velocities(), "Cycles leaves out the samples between the frames"
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "other.usdc")) == {"FINISHED"}
+    from pxr import Usd
+
+    stage = Usd.Stage.Open(str(folder / "other.usdc"))
+    assert stage.GetAttributeAtPath("/Character/Hair_Hair.velocities").GetNumTimeSamples()
+
+
 def _drawn(strands, frame: int) -> tuple:
     """Points (N, 3) of the curves with their steps in between, as geometry nodes get them, largest radius, and bounds
     (2, 3), all in the object's space.
