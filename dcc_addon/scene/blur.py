@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion blur of live hair: renderers ask for points within the shutter only of objects whose modifiers may deform them,
-and live hair, which a handler moves, often has none.
+and live hair, which a handler moves, often has none. If hair has velocities, Cycles blurs it along these instead: a groom from a
+file may have some, of the motion that it had there.
 """
 
 import bpy
@@ -11,13 +12,22 @@ from .nodes import geometry_nodes
 NAME = "Neuralocks Motion Blur"
 TREE = f".{NAME}"
 """The dot keeps it out of menus. It stays in the session, and in no file, because files only hold data with users."""
+VELOCITY = "velocity"
+"""The attribute that Cycles reads."""
 
 
 def begin(hair, scene) -> None:
-    """Give moved hair a modifier that changes nothing, for the duration of a render."""
-    if hair.library is None and curves.has_rest(hair.data) and not hair.is_deform_modified(scene, "RENDER"):
+    """Give moved hair a modifier that only takes its velocities off, for the duration of a render."""
+    if hair.library is not None or not curves.has_rest(hair.data):
+        return
+    if has_velocities(hair) or not hair.is_deform_modified(scene, "RENDER"):
         modifier = hair.modifiers.new(NAME, "NODES")
-        modifier.node_group = _nothing()
+        modifier.node_group = _without_velocities()
+
+
+def has_velocities(hair) -> bool:
+    """Whether a groom has velocities of its own."""
+    return VELOCITY in hair.data.attributes
 
 
 def end() -> None:
@@ -30,10 +40,13 @@ def end() -> None:
             thing.modifiers.remove(modifier)
 
 
-def _nothing():
-    """Geometry nodes that return their input."""
+def _without_velocities():
+    """Geometry nodes that return their input without velocities."""
     tree = bpy.data.node_groups.get(TREE)
     if tree is None:
         tree, source, target = geometry_nodes(TREE)
-        tree.links.new(source, target)
+        node = tree.nodes.new("GeometryNodeRemoveAttribute")
+        node.inputs["Name"].default_value = VELOCITY
+        tree.links.new(source, node.inputs["Geometry"])
+        tree.links.new(node.outputs["Geometry"], target)
     return tree

@@ -163,6 +163,40 @@ def motion_blur(folder: Path) -> None:
         assert not saved.node_groups
 
 
+def own_velocities(folder: Path) -> None:
+    """A groom keeps velocities that it has from a file, and no renderer blurs live hair along them; attached, it has those of the
+    cache, also with samples between the frames.
+    """
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    stored = np.full(3 * len(strands.data.points), 7.0, np.float32)
+    strands.data.attributes.new("velocity", "FLOAT_VECTOR", "POINT").data.foreach_set("vector", stored)
+    deform = scenes.surface_deform(strands)  # with it, renderers ask for points within the shutter anyway
+    got = []
+
+    def look(engine, graph):
+        got.append("velocity" in strands.evaluated_get(graph).data.attributes)
+
+    film(scene)
+    with witness(look):
+        scene.render.engine = ENGINE
+        bpy.ops.render.render()
+        make_live(rig, strands)
+        bpy.ops.render.render()
+        strands.modifiers.remove(deform)
+        bpy.ops.render.render()
+    assert got == [True, False, False] and not messages(), messages()
+    assert strands.data.attributes["velocity"].data[0].vector[0] == 7.0 and not strands.modifiers
+    if bpy.app.version < (4, 5):
+        return
+    scene.neuralocks.subframes = 4
+    assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "hair.usdc")) == {"FINISHED"}
+    scene.frame_set(9)
+    data = strands.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert max(abs(each) for point in data.attributes["velocity"].data for each in point.vector) < 6.0
+
+
 def by_parts(folder: Path) -> None:
     """A file is rendered in parts, as render farms do, and through the compositor of another scene, by a Blender that has
     just opened it: in all parts the hair is that of the whole; if hair cannot move, the console says so.
