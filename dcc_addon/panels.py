@@ -11,7 +11,7 @@ from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
 from .scene.actions import has_keys
 from .scene.attach import has_cache, stretched_since
-from .scene.muting import off_meanwhile
+from .scene.muting import caches_of_others, off_meanwhile
 from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
 from .services.remaining import in_words
@@ -162,6 +162,9 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             words(layout, "The model is for held poses, so this hair feels no wind", "INFO")
         if off := off_meanwhile(hair):
             words(layout, f"Off while Live, or the hair would move twice: {', '.join(off)}", "INFO")
+        for cache in caches_of_others(hair):
+            shape = f"'{cache}' may have left it in the shape of a moved frame"
+            words(layout, f"{shape}; if so, import the groom at rest", "INFO")
         column = layout.column(align=True)
         for slider in SLIDERS:
             column.prop(own, slider.name, slider=True)

@@ -8,11 +8,11 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
+from .muting import CACHE as MODIFIER
 from .muting import mute_deformers, off_meanwhile, unmute_deformers
 from .paths import full
 from .save_as import named_here
 
-MODIFIER = "Neuralocks Cache"
 REPLACED = "replaced"
 """The setting that stores which modifiers are off because the cache contains the surface's motion."""
 

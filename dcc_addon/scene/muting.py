@@ -9,6 +9,8 @@ from . import unbound
 from .nodes import inputs_of, read_input, write_input
 from .remembered import remembered
 
+CACHE = "Neuralocks Cache"
+"""The modifier that plays a bake of this add-on."""
 SIMULATION, DEFORM = "GeometryNodeXPBDSolver", "GeometryNodeDeformCurvesOnSurface"
 """Nodes at the heart of the modifiers that Blender puts on new hair: since 5.2 Hair Dynamics, before that Surface Deform."""
 PLAIN = {DEFORM, "NodeGroupInput", "NodeGroupOutput", "NodeReroute", "NodeFrame"}
@@ -73,6 +75,14 @@ def off_meanwhile(hair) -> list[str]:
         name for kept in (own.muted, own.replaced) for name, before in remembered(kept, _fits).items() if True in before
     ]
     return [name for name in dict.fromkeys(found) if name in hair.modifiers]
+
+
+def caches_of_others(hair) -> list[str]:
+    """Names of those of them that play a cache which is not of this add-on: an importer makes the shape of one of its frames the
+    shape of the curves.
+    """
+    named = [hair.modifiers[name] for name in off_meanwhile(hair)]
+    return [m.name for m in named if m.type == "MESH_SEQUENCE_CACHE" and m.name != CACHE]
 
 
 def on_top(hair) -> list[str]:
