@@ -17,7 +17,7 @@ from neuralocks_core.progress import Progress, silent
 from ..border.damage import first_line, named
 from ..border.stage_files import LAYERS, check_file, check_layer_name, check_not_over, one_file, open_stage
 from ..border.units import Border
-from ..shot.gaps import gaps
+from ..shot.gaps import gaps, thinned
 from ..shot.made_from import INPUTS, unlike
 from ..shot.notes import composition_notes, few, out_of_place
 from ..shot.recorded import KEY
@@ -100,7 +100,8 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
         raise
     codes = sorted({code for sources in plan.values() for code in sources})
     missing = _all_gaps(plan, frame, stage)
-    notes = composition_notes(stage, first.path) + missing + out_of_place(stage, out)
+    thin = dict.fromkeys(note for sources in plan.values() for note in thinned(list(sources), frame))
+    notes = composition_notes(stage, first.path) + missing + [*thin] + out_of_place(stage, out)
     return JoinResult(out, [str(groom) for groom in plan], codes, not missing, notes)
 
 

@@ -19,3 +19,19 @@ def gaps(codes: list[float], frame: float, first: float, last: float) -> list[st
     missed = usual * (1 - 1e-6)  # a shot may begin and end off a frame; less than a step is not a gap
     found = ([f"before {codes[0]:g}"] if codes[0] - first >= missed else []) + found
     return found + ([f"after {codes[-1]:g}"] if last - frames[-1] >= missed else [])
+
+
+def thinned(codes: list[float], frame: float) -> list[str]:
+    """The note on frames with at most half as many samples as others: a part that lacks its sub-frames."""
+    if len(codes) < 3 or np.ptp(np.diff(codes)) < 1e-6 * frame:
+        return []
+    numbers, counts = np.unique(np.floor((np.array(codes) - codes[0]) / frame + 1e-6), return_counts=True)
+    counts = counts[:-1]  # a range such as 1:9:0.5 ends with its last frame's first sample
+    fewer = np.flatnonzero(2 * counts <= counts.max(initial=0))
+    if not len(fewer):
+        return []
+    first = codes[0] + numbers[fewer[0]] * frame
+    return [
+        f"{len(fewer)} of {len(numbers)} frames, the first at {first:g}, have fewer samples than others, which have "
+        f"{counts.max()}; bake them again with the same --subframes, unless that is meant"
+    ]

@@ -141,6 +141,23 @@ def test_overlaps_and_gaps(shot, tmp_path, model):
         )
 
 
+def test_a_part_without_its_subframes(shot, tmp_path, model):
+    fine, coarse = parts_of(shot, tmp_path, model, ("1:4", "9:12"), subframes=3), tmp_path / "coarse.usdc"
+    bake(shot, coarse, model, frames="5:8")
+    joined = join([*fine, coarse], tmp_path / "hair.usdc")
+    assert joined.complete
+    assert joined.notes == [
+        "4 of 12 frames, the first at 5, have fewer samples than others, which have 3; "
+        "bake them again with the same --subframes, unless that is meant"
+    ]
+
+
+@pytest.mark.parametrize("frames", ["1:9:0.5", "1:9:0.7", "1:9:2"])
+def test_frames_that_are_not_thinned(shot, tmp_path, model, frames):
+    part = bake(shot, tmp_path / "part.usdc", model, frames=frames).path
+    assert not any("fewer samples" in note for note in join([part], tmp_path / "hair.usdc").notes)
+
+
 def test_steps_are_no_gaps(shot, tmp_path, model):
     parts = parts_of(shot, tmp_path, model, ("3:5:2", "7:9:2"), subframes=3)
     joined = join(parts, tmp_path / "hair.usdc")
