@@ -23,7 +23,7 @@ from ..border.units import Border
 from ..rig.facing import facing_notes
 from ..rig.notes import RIG_JOINTS, mirrored_notes, weight_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
-from ..rig.stage import check_orients, core_meshes, describe_chains
+from ..rig.stage import check_orients, core_meshes, describe_chains, is_baked
 from ..rig.uneven import names_uneven_prims
 from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
@@ -116,8 +116,10 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     search = HairSearch(rigs, head, spoils)
     grooms = _grooms(search, curves, border, spoils, stops)
     spoils += search.off_heads() + without_body(search.carriers, rigs)
-    if not grooms and any(skeleton["hair chains"] for skeleton in skeletons):
-        spoils.append(f"{path.name}: holds no groom; neuralocks rig train and rig bake move its hair chains")
+    hairy = [rig for rig, skeleton in zip(rigs, skeletons) if skeleton["hair chains"]]
+    if hairy and not grooms:
+        how = "a rig bake moves" if all(map(is_baked, hairy)) else "neuralocks rig train and rig bake move"
+        spoils.append(f"{path.name}: holds no groom; {how} its hair chains")
     elif not curves:
         stops.append(str(no_groom(stage, Path(path.name))))
     lines = {"stops": list(dict.fromkeys(stops)), "spoils": list(dict.fromkeys(spoils))}
@@ -134,6 +136,8 @@ def _rig(rig: StageRig) -> dict:
         "joints": len(rig.source.names),
         "joint names": list(rig.source.names),
         "animated": rig.source.animated,
+        "animation": None if rig.source.animation is None else str(rig.source.animation.GetPath()),
+        "moved by a rig bake": is_baked(rig),
         "samples": len(rig.source.samples),
         "head": found.get("head"),
         "head found by": humanoid.reasons.get("head"),

@@ -71,7 +71,7 @@ def read_rigged_hair(path: str | Path, *, baked_first: bool = False, **options) 
     """
     found, _ = read_rigged_hairs(path, **options)
     if baked_first:
-        found.sort(key=lambda hair: not _is_baked(hair.source))
+        found.sort(key=lambda hair: not is_baked(hair.source))
         found = [replace(found[0], others=tuple(hair.source.path for hair in found[1:]))]
     if len(found) > 1:
         few = ", ".join(hair.source.path for hair in found[:_FEW]) + (", ..." if len(found) > _FEW else "")
@@ -171,7 +171,7 @@ def _of_model(model: HairChains, character: Character) -> HairChains:
     return placed_chains(chains, character)
 
 
-def _is_baked(source: StageRig) -> bool:
+def is_baked(source: StageRig) -> bool:
     """Whether the animation of a skeleton is one that `rig bake` wrote."""
     animation = source.source.animation
     return animation is not None and animation.GetName() == BAKED

@@ -57,6 +57,14 @@ def test_whoever_reads_the_copy_is_told_that_it_is_old(folder):
     assert not any("changed since" in note for note in inspect(folder / "hair.usda")["spoils"])
 
 
+def test_inspect_tells_hair_that_a_bake_moves_from_hair_that_it_could_move(folder):
+    shot, baked = (inspect(folder / f"{name}.usda") for name in ("shot", "hair"))
+    assert [each["skeletons"][0]["animation"] for each in (shot, baked)] == ["/Who/Motion", "/Who/Rig/NeuralocksHair"]
+    assert [each["skeletons"][0]["moved by a rig bake"] for each in (shot, baked)] == [False, True]
+    assert any("neuralocks rig train and rig bake move its hair chains" in note for note in shot["spoils"])
+    assert any("a rig bake moves its hair chains" in note for note in baked["spoils"])
+
+
 def test_a_copy_is_old_as_soon_as_two_degrees_differ(folder):
     stage = Usd.Stage.Open(str(folder / "shot.usda"))
     rotations = stage.GetPrimAtPath("/Who/Motion").GetAttribute("rotations")
