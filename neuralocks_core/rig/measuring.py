@@ -18,6 +18,10 @@ DRIVEN = 0.3
 """Skin on which a joint has more than this weight determines how far its bone reaches."""
 UNEVEN = 1.01
 """Joints scaled this many times more along one axis than along another are refused."""
+ASTRAY, COVERED = 0.5, 0.5
+"""An end marker is not believed if the cosine of its angle to the skin and to the bone before is smaller, and the skin reaches less
+than this share of the way to it.
+"""
 SHORT, SHORT_AFTER = 0.01, 0.2
 """Skin that extends past a last joint by less than this is not a bone of its own: for a chain of one joint in [m], for others in
 lengths of the bone before."""
@@ -130,7 +134,11 @@ def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -
     for joint in order:
         riding = riders(skeleton, joint, drives)
         beyond = [child for child in skeleton.children[joint] if child not in riding]
-        end = None if beyond else _free_end(character, [joint, *riding], joint in tops, meshes, places)
+        own, only_markers = [joint, *riding], joint in carries and not carries.intersection(beyond)
+        end = None
+        if not beyond or only_markers and _astray(character, own, beyond, joint in tops, meshes, places):
+            end = _free_end(character, own, joint in tops, meshes, places)
+            beyond = beyond if end is None else []
         if beyond and joint in carries or end is not None:
             rows[joint], free[joint], ends[joint] = len(rows), end, beyond
     return rows, free, ends
@@ -184,12 +192,9 @@ def _free_end(character: Character, own: list[int], is_top: bool, meshes, places
         places: positions of all joints in canonical space, (J, 3) [m].
     """
     joint, parent = own[0], int(character.skeleton.parents[own[0]])
-    mask = np.isin(np.arange(len(places)), own)
-    points = [mesh.points[mesh.weight_on(mask) > DRIVEN] for mesh in meshes or ()]
-    points = np.concatenate(points) if points else np.zeros((0, 3))
-    if not len(points):
+    reach = _reach(character, own, meshes, places)
+    if not len(reach):
         return None
-    reach = character.canonical(points) - places[joint]
     along = reach.mean(axis=0) if is_top else places[joint] - places[parent]
     size = np.linalg.norm(along)
     if size < NO_BONE:
@@ -200,6 +205,33 @@ def _free_end(character: Character, own: list[int], is_top: bool, meshes, places
     if length < (SHORT if is_top else SHORT_AFTER * size):
         return None
     return places[joint] + length * along
+
+
+def _astray(character: Character, own: list[int], markers: list[int], is_top: bool, meshes, places: np.ndarray) -> bool:
+    """Whether end markers of a joint all lie on the joint itself, or off its skin and off the bone before: exporters put such "leaf
+    bones" where a bone's axis points, which need not be along the hair.
+
+    Args:
+        own, is_top, places: as for `_free_end`.
+        markers: children that drive nothing.
+    """
+    reach, ends = _reach(character, own, meshes, places), places[markers] - places[own[0]]
+    if not len(reach):
+        return False
+    sizes = np.linalg.norm(ends, axis=1)
+    if (sizes < NO_BONE).all():
+        return True
+    ways = [reach.mean(axis=0)] + ([] if is_top else [places[own[0]] - places[character.skeleton.parents[own[0]]]])
+    off = [ends @ way < ASTRAY * sizes * np.linalg.norm(way) for way in ways]
+    bare = (reach @ ends.T).max(axis=0) < COVERED * sizes**2
+    return bool(np.all([*off, bare]))
+
+
+def _reach(character: Character, own: list[int], meshes, places: np.ndarray) -> np.ndarray:
+    """Skin of the first of these joints and those that ride on it, as seen from there (n, 3) [m]."""
+    mask = np.isin(np.arange(len(places)), own)
+    points = [mesh.points[mesh.weight_on(mask) > DRIVEN] for mesh in meshes or ()]
+    return character.canonical(np.concatenate(points)) - places[own[0]] if points else np.zeros((0, 3))
 
 
 def _check_scale(skeleton: Skeleton, joints: np.ndarray) -> None:

@@ -238,3 +238,22 @@ def test_joint_orients_and_facing_cancel():
     other = find_chains(moved)
     np.testing.assert_allclose(other.origins, plain.origins, atol=1e-9)
     np.testing.assert_allclose(other.bones, plain.bones, atol=1e-9)
+
+
+@pytest.mark.parametrize("place", [(0.05, 1.54, -0.11), (0, 1.54, -0.11)], ids=["aside", "on its joint"])
+def test_an_end_marker_off_the_hair_is_not_believed(place):
+    """Exporters add "leaf bones" where a bone's axis points; the skin tells where the hair ends."""
+    who = character([*tail("hair", 2), ("hair_2_end", "hair_2", place)])
+    along, ends = np.array([0, -0.06, -0.01]), np.array([[0.2], [0.6], [1.2]])
+    sheets = {f"hair_{i + 1}": [0, 1.6, -0.1] + along * (i + ends) for i in range(2)}
+    chains = find_chains(who, [skin(who, sheets)])
+    assert chains.names == ("hair_1", "hair_2")
+    np.testing.assert_allclose(chains.bones, [along, 1.2 * along], atol=1e-12)
+
+
+def test_an_end_marker_of_hair_that_turns_is_believed():
+    """The skin goes with it."""
+    aside, tip = np.array([0.05, 0, 0]), np.array([0, 1.54, -0.11])
+    who = character([*tail("hair", 2), ("hair_2_end", "hair_2", tuple(tip + aside))])
+    mesh = skin(who, {"hair_1": [[0, 1.57, -0.105]] * 3, "hair_2": tip + aside * [[0.1], [0.5], [0.9]]})
+    np.testing.assert_allclose(find_chains(who, [mesh]).bones[1], aside, atol=1e-12)
