@@ -14,7 +14,7 @@ def plain(value, digits: int | None = None):
 
     Args:
         value: what to copy.
-        digits: decimal places to which numbers are rounded; left out, they are not rounded.
+        digits: significant digits to which numbers are rounded; left out, they are not rounded.
     """
     if isinstance(value, dict):
         return {str(key): plain(item, digits) for key, item in value.items()}
@@ -25,7 +25,7 @@ def plain(value, digits: int | None = None):
     if isinstance(value, float):
         if not math.isfinite(value):
             return None
-        return value if digits is None else round(value, digits)
+        return value if digits is None else float(f"{value:.{digits}g}")
     return value
 
 

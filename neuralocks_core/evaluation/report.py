@@ -81,7 +81,7 @@ class Card:
     def to_json(self) -> str:
         """The numbers, for machines; what could not be measured is null."""
         body = {"title": self.title, "grooms": self.grooms, "compared": self.compared, "notes": list(self.notes)}
-        return json.dumps(plain(body, digits=6), indent=2, sort_keys=False)
+        return json.dumps(plain(body, digits=8), indent=2, sort_keys=False)
 
     def text(self, encoding: str | None = "utf-8") -> str:
         """The card for people, in characters of `encoding`; others, such as frame corners or letters of a name, are replaced."""

@@ -23,6 +23,9 @@ CLAMPED = 2
 PLACEHOLDER_LENGTH = 0.01
 """Length [m] of the straight strand that stands in for one that has no two distinct points."""
 
+SHORTEST_EDGE = 1e-7
+"""A strand with a shorter edge [m] between the network's vertices has no direction there, and does not move."""
+
 __all__ = ["StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set", "strands_on"]
 
 
@@ -34,7 +37,8 @@ class StrandSet:
     """(S, K, 3) float32 [m], canonical space, uniform in arc length of the author's strand; for curls finer than that,
     the line they wind around (`centreline`)."""
     valid: np.ndarray
-    """(S,) bool, false where the groom's strand has no two distinct points; its other values are placeholders."""
+    """(S,) bool, false where the groom's strand has no two distinct points, or doubles back so exactly that two of the K vertices lie in
+    one place; its other values are placeholders."""
     uv: np.ndarray
     """(S, 2) float32 in [0, 1], direction of the root seen from the head's centre."""
     root_frame: np.ndarray
@@ -129,6 +133,8 @@ def strand_set(
 
     sampled, valid = resample(groom, K)
     sampled[valid] = centre_lines(sampled[valid])
+    # Where a strand goes back on itself, two vertices may lie in one place.
+    valid &= np.linalg.norm(np.diff(sampled, axis=1), axis=2).min(axis=1) > SHORTEST_EDGE
     rest = (sampled - head_origin) @ facing.T
     rest[groom.counts == 0] = head_centre + [0.0, 0.1, 0.0]
     normal = _root_normals(rest[:, 0], head_centre)

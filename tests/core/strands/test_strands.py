@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from neuralocks_core.groom import Groom
 from neuralocks_core.network_sizes import K
+from neuralocks_core.reference.rest import rest_rods
 from neuralocks_core.strands.centreline import centre_lines
 from neuralocks_core.strands.strand_set import root_frames, root_uv, scalp_local, strand_set
 from tests.core.strands.odd_grooms import CENTRE, ORIGIN, ragged_groom
@@ -71,3 +72,14 @@ def test_uv_keeps_areas_and_fills_the_square():
     count, *_ = np.histogram2d(*uv.T, bins=10, range=[[0.15, 0.85]] * 2)
     assert count.std() / count.mean() < 0.05
     np.testing.assert_allclose(root_uv(CENTRE + [[0, 0.1, 0]], CENTRE), [[0.5, 0.5]])
+
+
+def test_a_strand_that_goes_back_on_itself_is_no_rod():
+    """The middle two of its 24 vertices lie at its turning point, so an edge has no direction: the solver would refuse the groom."""
+    there = np.linspace(0, 0.1, 12)
+    back = np.stack([0 * np.arange(24), np.concatenate([there, there[::-1]]), 0 * np.arange(24)], axis=1)
+    straight = np.stack([np.full(24, 0.02), np.linspace(0, 0.2, 24), np.zeros(24)], axis=1)
+    groom = Groom("Hair", np.concatenate([back, straight]).astype(np.float32) + np.float32([0, 1.7, 0]), [24, 24])
+    strands = strand_set(groom, [0, 1.6, 0], [0, 0.05, 0])
+    assert strands.valid.tolist() == [False, True]
+    assert rest_rods(strands.rest).length.shape == (2, 24)

@@ -58,7 +58,7 @@ def test_what_is_no_number_is_null_for_machines(tmp_path, model, capsys):
     assert status("export", odd, "-o", tmp_path) == 0
     json.loads((tmp_path / "description.json").read_text(), parse_constant=pytest.fail)
     assert plain({1: (np.float32(0.5), np.int64(3), np.nan)}) == {"1": [0.5, 3, None]}
-    assert plain([1.23456789], digits=6) == [1.234568]
+    assert plain([1.23456789, 1.23456789e-9], digits=7) == [1.234568, 1.234568e-9]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names do not depend on the locale")
