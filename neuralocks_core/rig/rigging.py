@@ -34,6 +34,11 @@ class HairRig:
     weights: np.ndarray
     triangles: np.ndarray
 
+    def with_body(self, body: Body | None) -> "HairRig":
+        """The same hair with another body, or with none if that is out of its reach."""
+        near = body is not None and self.in_reach(body).any()
+        return replace(self, character=replace(self.character, body=body if near else None))
+
     def in_reach(self, body: Body) -> np.ndarray:
         """Which triangles (F,) bool of the character's body the hair could touch."""
         hair = np.concatenate([self.points, self.chains.origins])
@@ -71,15 +76,13 @@ def assemble_rig(
         faces = np.concatenate(body_triangles) if body_triangles else np.zeros((0, 3), int)
         body = Body(body.points, faces, body.joint_indices, body.joint_weights, body.shapes) if len(faces) else None
     rig = HairRig(
-        replace(character, body=None),
+        character,
         chains,
         np.concatenate(points) if points else np.zeros((0, 3)),
         np.concatenate(weights) if weights else np.zeros((0, len(chains) + 1)),
         np.concatenate(triangles) if triangles else np.zeros((0, 3), int),
     )
-    if body is None or not rig.in_reach(body).any():
-        return rig
-    return replace(rig, character=replace(character, body=body))
+    return rig.with_body(body)
 
 
 def moving_joints(skeleton: Skeleton, chains: HairChains) -> np.ndarray:

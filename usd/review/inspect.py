@@ -50,6 +50,7 @@ from ..shot.notes import (
 from ..shot.recorded import recorded, recorded_cuts, retimed
 from ..shot.skeletons import read_each_rig
 from ..shot.stage import frame_range
+from ..shot.whole_body import parts_elsewhere
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 
@@ -105,7 +106,13 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     read = POSE_JOINTS if curves else RIG_JOINTS
     for rig in rigs:
         stops += without_turn(rig, read)
-        spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + lies_down(rig) + partial_body(rig, rigs)
+        spoils += (
+            rig.notes
+            + rig_notes(rig, read)
+            + another_head(rig)
+            + lies_down(rig)
+            + partial_body(rig, parts_elsewhere(rig, rigs)[1])
+        )
         spoils += [] if told else rig.cut_notes()
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:

@@ -2,6 +2,7 @@
 """A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from neuralocks_core.rig.finding import NoHairChains, fits
 from neuralocks_core.rig.measuring import UNEVEN, placed_chains
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
+from neuralocks_core.skinned_body import Body
 
 from ..border.damage import names_damage
 from ..border.prim_paths import prim_path
@@ -22,6 +24,10 @@ from ..border.stage_files import open_stage
 from ..border.stopping import check
 from ..border.units import Border
 from ..shot.lacking import has_hair_joints, nothing_found
+from ..shot.notes import partial_body
+from ..shot.others import Others
+from ..shot.skeletons import read_each_rig
+from ..shot.whole_body import parts_elsewhere
 from ..skel.source import find_skeletons, read_rig
 from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins
@@ -124,8 +130,9 @@ def read_rigged_hairs(
     if not prims:
         raise nothing_found(stage, Path(path), "Skeleton", "give a stage with a skinned character")
     given = {"all_shapes": all_shapes, "joints": joints, "cuts": cuts, "unbaked": unbaked}
-    found, errors, skins = [], [], find_skins(stage)
+    found, errors, bare, skins = [], [], [], find_skins(stage)
     for prim in prims:
+        source = None
         try:
             _check_authored(prim)
             source = read_rig(stage, prim, border, head, skins=skins, **given)
@@ -136,6 +143,7 @@ def read_rigged_hairs(
                 check_orients(source, rig.chains)
         except NeuralocksError as error:
             check()  # the error may come from a stop by the user
+            bare += [] if source is None else [source]
             errors.append((str(prim.GetPath()), _is_hairy(prim, model), type(error), _with_path(prim, error)))
             continue
         found.append(RiggedHair(stage, border, source, rig))
@@ -144,7 +152,28 @@ def read_rigged_hairs(
     if not found:
         *_, kind, text = (hairy or errors)[0]
         raise kind(text)
+    if model is None:
+        read = Others(
+            [hair.source for hair in found], find_skeletons(stage), partial(_read_others, stage, border, head)
+        )
+        found = _on_whole_bodies(found, bare if skeleton is None else read.maybe_same())
     return found, [of_skeleton(path, text) for path, *_, text in hairy]
+
+
+def _read_others(stage: Usd.Stage, border: Border, head: str | None, prims: list[Usd.Prim]) -> list[StageRig]:
+    return read_each_rig(stage, prims, border, head)[0]
+
+
+def _on_whole_bodies(found: list[RiggedHair], others: list[StageRig]) -> list[RiggedHair]:
+    """Hair that may touch all meshes of its character, which may be in several skeletons; the hair of these is no body."""
+    every, result = [*(replace(hair.source, character=hair.rig.character) for hair in found), *others], []
+    for hair in found:
+        parts, left = parts_elsewhere(hair.source, every)
+        hair.source.notes.extend(partial_body(hair.source, left))
+        own = hair.rig.character.body
+        whole = hair.rig.with_body(Body.joined([*([] if own is None else [own]), *parts])) if parts else hair.rig
+        result.append(replace(hair, rig=whole))
+    return result
 
 
 def of_skeleton(path: str, error) -> NeuralocksError:

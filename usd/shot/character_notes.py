@@ -19,8 +19,9 @@ from ..border.arrays import column_matrix
 from ..border.values import as_numbers
 from ..skel.stage_rig import StageRig
 from ..skel.surface import bound_skeleton, drawn
-from .notes import partial_body, unlikely_head
+from .notes import unlikely_head
 from .seat import beginnings
+from .whole_body import parts_elsewhere
 
 AROUND = 0.25
 """A mesh with some points this near to a head's joint [m] is the head's, or on it."""
@@ -100,7 +101,7 @@ def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[s
         rigs: skeletons that carry hair.
         others: all skeletons of the stage; a character in several skeletons has its own note elsewhere.
     """
-    bare = [rig for rig in rigs if rig.character.body is None and not partial_body(rig, others)]
+    bare = [rig for rig in rigs if rig.character.body is None and not any(parts_elsewhere(rig, others))]
     if not bare:
         return []
     hidden, loose = _unused_meshes(bare[0].source.prim.GetStage())

@@ -20,7 +20,6 @@ from ..border.damage import text_of
 from ..border.stage_files import unsaved
 from ..border.units import Border
 from ..skel.stage_rig import StageRig
-from .alike import one_person
 
 UNIT = UsdGeom.Tokens.metersPerUnit
 FEW = 3
@@ -230,16 +229,13 @@ def _turnless(transform: np.ndarray) -> bool:
     return bool(flat(linear) or np.linalg.det(linear) < 0)
 
 
-def partial_body(rig: StageRig, rigs: Iterable[StageRig]) -> list[str]:
-    """The note on a character in several skeletons, head and body or clothes: those that have meshes, and whose head, neck or
-    chest is where this one's is.
-    """
-    others = [other.path for other in rigs if other.path != rig.path and other.meshes and one_person(rig, other)]
-    if not others:
+def partial_body(rig: StageRig, left: Sequence[str]) -> list[str]:
+    """The note on a character in several skeletons, head and body or clothes: on those of which `whole_body` can use nothing."""
+    if not left:
         return []
     return [
-        f"{rig.path}: {', '.join(others[:3])} {'is' if len(others) == 1 else 'are'} the same character, but hair is not kept "
-        "out of those meshes; bind all to one skeleton if hair touches them"
+        f"{rig.path}: {', '.join(left[:3])} {'is' if len(left) == 1 else 'are'} the same character, but no joint there moves like one "
+        "of the same name here, so hair is not kept out of those meshes; bind all to one skeleton if hair touches them"
     ]
 
 

@@ -10,6 +10,7 @@ from pxr import Usd
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
+from neuralocks_core.skinned_body import Body
 
 from ..border.damage import names_damage
 from ..border.placement import Placement
@@ -37,6 +38,7 @@ from .notes import (
 )
 from .others import Others
 from .skeletons import read_each_rig
+from .whole_body import whole_body
 
 
 @dataclass(frozen=True)
@@ -128,9 +130,7 @@ def read_shot(
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
     others = None
     if skeleton is not None and not grooms:
-        others = Others(
-            rigs, find_skeletons(stage), lambda prims: read_each_rig(stage, prims, border, head, joints=joints)[0]
-        )
+        others = _others(rigs, stage, border, head, joints)
     search = HairSearch(rigs, head, notes, named=bool(grooms), others=others, forced=bool(grooms and skeleton))
     found = _grooms(search, curves, notes)
     no_hair = search.no_hair()
@@ -145,7 +145,9 @@ def read_shot(
     for rig in used:
         if not still:
             _check_animated([rig])
-        notes += rig.notes + lies_down(rig) + partial_body(rig, every)
+        body, left = whole_body(rig, every)
+        found = [_on(body, item) if item.attachment.rig is rig else item for item in found]
+        notes += rig.notes + lies_down(rig) + partial_body(rig, left)
     notes += without_body(used, every)
     for item in found:
         carrying = replace(item.attachment.rig, character=item.attachment.character)
@@ -169,7 +171,7 @@ def read_shot(
 def read_rigs(
     path, skeleton: str | None = None, head: str | None = None, joints: dict[str, str] | None = None
 ) -> tuple[StageRig, ...]:
-    """The characters and motion of a file, animated or not, without grooms.
+    """The characters and motion of a file, animated or not, without grooms; the first with its whole body.
 
     Args:
         path: a USD file.
@@ -178,9 +180,14 @@ def read_rigs(
         joints: semantic joint -> joint, if names are not enough.
     """
     stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
-    rigs, unusable = _rigs(stage, Border.of(stage), skeleton, head, Path(path), all_shapes=True, joints=joints)
-    rigs[0].notes.extend(unusable)
-    return tuple(rigs)
+    border = Border.of(stage)
+    rigs, unusable = _rigs(stage, border, skeleton, head, Path(path), all_shapes=True, joints=joints)
+    first, every = rigs[0], rigs
+    if skeleton is not None:
+        every = [*rigs, *_others(rigs, stage, border, head, joints).maybe_same()]
+    body, left = whole_body(first, every)
+    first.notes.extend(unusable + partial_body(first, left))
+    return replace(first, character=replace(first.character, body=body)), *rigs[1:]
 
 
 def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
@@ -218,6 +225,14 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
     return found
 
 
+def _on(body: Body | None, item: StageGroom) -> StageGroom:
+    """A groom on a character with this body."""
+    if body is item.attachment.character.body:
+        return item
+    character = replace(item.attachment.character, body=body)
+    return replace(item, attachment=replace(item.attachment, character=character))
+
+
 def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
     """The grooms whose skeleton is animated, with a note on the others; all if none is."""
     moving = [item for item in grooms if item.attachment.rig.source.animated]
@@ -244,6 +259,13 @@ def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tup
     if errors and (not rigs or skeleton):
         raise errors[0]
     return rigs, few([left_out(error) for error in errors], "skeletons are left out")
+
+
+def _others(rigs: list[StageRig], stage: Usd.Stage, border: Border, head: str | None, joints) -> Others:
+    """The skeletons besides named ones."""
+    return Others(
+        rigs, find_skeletons(stage), lambda prims: read_each_rig(stage, prims, border, head, joints=joints)[0]
+    )
 
 
 def _check_animated(rigs: list[StageRig]) -> None:

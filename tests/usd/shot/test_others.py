@@ -61,10 +61,14 @@ def test_what_lies_far_from_a_named_skeleton_is_left_out_without_its_own(tmp_pat
     assert len(told) == 2 and all("m from the head of /bob/Model/Rig; left out" in note for note in told)
 
 
-def test_a_second_skeleton_of_the_same_person_is_still_told(tmp_path, read):
-    path = _crowd(tmp_path, "own", apart=0.0)
-    assert any("/ann/Model/Rig: /bob/Model/Rig, /cy/Model/Rig are the same character" in note
-               for note in read_shot(path, skeleton="/ann/Model/Rig").notes)  # fmt: skip
+def test_the_other_skeletons_of_a_named_person_are_read(tmp_path, read):
+    """Hair is kept out of their meshes, too."""
+    counts = []
+    for apart in (2.0, 0.0):
+        (tmp_path / f"{apart}").mkdir()
+        (groom,) = read_shot(_crowd(tmp_path / f"{apart}", "own", apart), skeleton="/ann/Model/Rig").grooms
+        counts.append(len(groom.attachment.character.body.points))
+    assert counts[1] == 3 * counts[0]
 
 
 def test_a_skeleton_without_hair_in_a_crowd_is_told_so(tmp_path):

@@ -210,21 +210,6 @@ def test_strands_too_short_to_move_are_counted_alike_everywhere():
     assert said == "/Dots: 4 of 4 strands have no two distinct points; they follow the head rigidly"
 
 
-def test_the_rest_of_a_character_on_a_skeleton_of_its_own_is_told(tmp_path):
-    path = write_shot(tmp_path)
-    layer = Sdf.Layer.FindOrOpen(str(path))
-    Sdf.CopySpec(layer, "/Hero", layer, "/Coat")  # the binding is copied with its targets
-    stage = Usd.Stage.Open(layer)
-    stage.RemovePrim("/Coat/Hair")
-    layer.Save()
-    told = "/Hero/Rig: /Coat/Rig is the same character, but hair is not kept out of those meshes; bind all"
-    assert any(note.startswith(told) for note in read_shot(path).notes)
-    assert any(note.startswith(told) for note in inspect(path)["spoils"])
-    UsdGeom.Xformable(stage.GetPrimAtPath("/Coat")).AddTranslateOp().Set((1, 0, 0))
-    layer.Save()  # now it is another character
-    assert not any("same character" in note for note in read_shot(path).notes)
-
-
 def test_why_a_skeleton_is_left_out_is_told_whoever_comes_first(tmp_path):
     """Also if the first character of the stage carries no hair, so that no other message mentions it."""
     path = write_shot(tmp_path, Recipe(nesting="/Dog"))
