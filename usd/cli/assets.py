@@ -38,7 +38,7 @@ def import_command(
 ) -> None:
     """Write hair files as USD grooms, as they are or on the head of a character."""
     from ..assets.importing import import_groom
-    from ..review.inspect import groom_facts
+    from ..review.groom_facts import groom_facts
     from .progress import progress_bar
 
     with progress_bar("importing") as progress:

@@ -3,21 +3,15 @@
 
 from pathlib import Path
 
-import numpy as np
-from pxr import UsdGeom
-
 from neuralocks_core.anatomy.humanoid import NoHead
 from neuralocks_core.boundary_spec import POSE_JOINTS
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
-from neuralocks_core.groom import Groom
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.rigging import assemble_rig
-from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
 
 from ..border.damage import names_damage
-from ..border.placement import Placement
 from ..border.stage_files import OTHERS, USD, open_stage
 from ..border.units import Border
 from ..rig.facing import facing_notes
@@ -25,15 +19,10 @@ from ..rig.notes import RIG_JOINTS, mirrored_notes, weight_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import check_orients, core_meshes, describe_chains, is_baked
 from ..rig.uneven import names_uneven_prims
-from ..shot.attach import rig_joint
 from ..shot.character_notes import lies_down, without_body
-from ..shot.curve_ends import groom_between, undrawn
-from ..shot.curves import find_curves, rest_counts
-from ..shot.gaps import gaps
-from ..shot.groom_notes import groom_notes
+from ..shot.curves import find_curves
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom, no_skeleton
-from ..shot.made_from import baked_from_others
 from ..shot.motion_notes import motion_notes
 from ..shot.notes import (
     another_head,
@@ -47,12 +36,13 @@ from ..shot.notes import (
     rig_notes,
     without_turn,
 )
-from ..shot.recorded import recorded, recorded_cuts, retimed
+from ..shot.recorded import recorded, recorded_cuts
 from ..shot.skeletons import read_each_rig
 from ..shot.stage import frame_range
 from ..shot.whole_body import parts_elsewhere
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
+from .groom_facts import facts_of_grooms, groom_facts
 
 
 def inspect(path, head: str | None = None, joints: dict[str, str] | None = None) -> dict:
@@ -121,7 +111,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     elif rigs:
         stops.append(not_animated(rigs[0]))
     search = HairSearch(rigs, head, spoils)
-    grooms = _grooms(search, curves, border, spoils, stops)
+    grooms = facts_of_grooms(search, curves, border, spoils, stops)
     spoils += search.off_heads() + without_body(search.carriers, rigs)
     hairy = [rig for rig, skeleton in zip(rigs, skeletons) if skeleton["hair chains"]]
     if hairy and not grooms:
@@ -188,96 +178,6 @@ def _height(rig: StageRig) -> float | None:
     if "head" not in rig.character.humanoid:
         return None
     return round(float(rig.character.skeleton.bind[rig.character.head, 1, 3]), 3)
-
-
-def _grooms(search: HairSearch, curves, border: Border, spoils: list[str], stops: list[str]) -> list[dict]:
-    """Facts about the curves that are hair; a problem with one of them does not hide the others."""
-    grooms = []
-    for prim in search.filled(curves):
-        try:
-            groom = _groom(prim, search if search.rigs else None, border, spoils, stops)
-            grooms += [groom] if groom else []
-        except NeuralocksError as error:
-            stops.append(str(error))
-    (spoils if grooms else stops).extend(search.no_hair() if curves else [])
-    return grooms
-
-
-def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], stops: list[str]) -> dict | None:
-    """Facts about one groom; `search` is None if there is no skeleton; returns None if the curves are not hair."""
-    placement = Placement(prim)
-    curves = UsdGeom.BasisCurves(prim)
-    facts = {"path": str(prim.GetPath()), "type": str(curves.GetTypeAttr().Get())}
-    if facts["type"] == UsdGeom.Tokens.cubic:
-        facts |= {"basis": str(curves.GetBasisAttr().Get()), "wrap": str(curves.GetWrapAttr().Get())}
-    found, to_bind, drawn, joint = None, None, False, {}
-    if search is not None:
-        try:
-            found = search.attachment(prim, placement)
-            if found is None:
-                return None
-            to_bind, drawn = found.to_bind, found.drawn
-            joint = {"joint": rig_joint(found), "carried by": found.how}
-        except NeuralocksError as error:
-            stops.append(str(error))
-    else:
-        spoils += undrawn(prim)
-    if to_bind is None:
-        to_bind = border.to_core @ placement.reference
-        # Without a character, only counts and lengths are reported, and the position changes neither.
-        to_bind[:3, 3] = 0
-    groom, beyond = groom_between(prim, to_bind, spoils, drawn=drawn)
-    if beyond is not None:
-        facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
-    if joint:
-        spoils += groom_notes(prim, groom, border)
-    if found:
-        spoils += baked_from_others(prim, found, groom)
-    made = recorded(prim)
-    baked = {"samples": _samples(prim, border), "baked with": made} if made else {}
-    spoils += retimed(prim) + _unfit(prim) if made else []
-    return facts | joint | groom_facts(groom) | baked
-
-
-def _samples(prim, border: Border) -> dict:
-    """Which frames a bake holds."""
-    codes, stage = UsdGeom.BasisCurves(prim).GetPointsAttr().GetTimeSamples(), prim.GetStage()
-    if not codes:
-        return {"number": 0}
-    missing = gaps(codes, border.frame, stage.GetStartTimeCode(), stage.GetEndTimeCode())
-    return {"first": codes[0], "last": codes[-1], "number": len(codes), "missing": missing}
-
-
-def _unfit(prim) -> list[str]:
-    """The note on a bake that does not fit the layers above or below it."""
-    curves, count = UsdGeom.BasisCurves(prim), int(rest_counts(prim).sum())
-    codes = curves.GetPointsAttr().GetTimeSamples()
-    if not codes:
-        return [f"{prim.GetPath()}: its samples are hidden by a stronger layer; bake again"]
-    code = codes[len(codes) // 2]
-    for attribute in (curves.GetPointsAttr(), curves.GetVelocitiesAttr()):
-        values = attribute.Get(code)
-        if values is not None and len(values) not in (0, count):
-            fact = f"{len(values)} {attribute.GetName()} at time code {code:g} for curves of {count} points"
-            return [f"{prim.GetPath()}: {fact}; bake again"]
-    return []
-
-
-def groom_facts(groom: Groom) -> dict:
-    """Counts and lengths of a groom's strands [m], as plain values."""
-    _, lengths = arc_lengths(groom)
-    return {
-        "name": groom.name,
-        "strands": groom.strand_count,
-        "vertices": len(groom.points),
-        "vertices per strand": sorted({int(groom.counts.min()), int(groom.counts.max())}),
-        "strand length [m]": {
-            "shortest": round(float(lengths.min()), 4),
-            "median": round(float(np.median(lengths)), 4),
-            "longest": round(float(lengths.max()), 4),
-        },
-        "without two distinct points": count_pointlike(groom),
-    }
 
 
 def _model(path: Path) -> dict:

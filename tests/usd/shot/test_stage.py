@@ -13,7 +13,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.arclength import resample
 from usd.border.units import Border
-from usd.review.inspect import groom_facts, inspect
+from usd.review.groom_facts import groom_facts
+from usd.review.inspect import inspect
 from usd.shot.groom_notes import groom_notes
 from usd.shot.stage import read_rigs, read_shot
 
