@@ -44,7 +44,7 @@ def test_what_follows_simulated_hair_is_kept_out_of_the_body(tmp_path, monkeypat
     assert (points[0][chosen] == points[1][chosen]).all() and (points[0] != points[1]).any()
     free, kept = (card["penetration_3mm_percent"] for card in cards)
     assert kept < 0.1 * free > 0.05
-    monkeypatch.setattr("usd.review.evaluate.STRANDS", 20)
+    monkeypatch.setattr("usd.review.subject.STRANDS", 20)
     few = evaluate(tmp_path / "free.usdc").grooms["/Hero/Hair"]
     assert few["measured"] == 20 and few["penetration_3mm_percent"] > 0.3 * free
 

@@ -250,6 +250,6 @@ def test_a_model_that_cannot_be_read_is_refused_before_anything_is_measured(rigi
 def test_of_very_many_vertices_distances_are_measured_of_some(tmp_path, still_model, monkeypatch):
     baked, shares = bake(write_shot(tmp_path), tmp_path / "a.usdc", still_model, frames="1").path, []
     for most in (100_000, 120):
-        monkeypatch.setattr("usd.review.evaluate.COLLISION_VERTICES", most)
+        monkeypatch.setattr("usd.review.subject.COLLISION_VERTICES", most)
         shares.append(next(iter(evaluate(baked).grooms.values()))["inside_at_rest_percent"])
     assert shares[0] > 5 and shares[1] == pytest.approx(shares[0], abs=4) and shares[1] != shares[0]
