@@ -14,7 +14,6 @@ from ..live import refresh
 from ..live_strands import show_rest
 from ..looks import grouped
 from ..scene import attach
-from ..scene.blur import has_velocities
 from ..scene.carried import hairs_of
 from ..scene.export import write_shot
 from ..scene.lookup import named
@@ -119,10 +118,8 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
         if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
             raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
     check_ours([*outs, *map(shot_beside, outs)], is_own)
-    # If hair has velocities, Cycles blurs it along straight lines, and leaves the samples between the frames unread. Without any, the
-    # groom's own would stay.
-    played = attached or any(attach.players(str(out)) for out in outs)
-    velocities = subframes == 1 or not played or any(map(has_velocities, hairs))
+    # If hair has velocities, Cycles blurs it along straight lines, and leaves the samples between the frames unread.
+    velocities = subframes == 1 or not (attached or any(attach.players(str(out)) for out in outs))
     sampled = yield from sampling(context, named(character), share=0.5)
     notes += [text for name, text in sampled.hairs_off.items() if any(name in names for _, _, names in groups)]
     baked: dict[str, tuple[str, str]] = {}

@@ -8,6 +8,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
+from . import blur
 from .muting import CACHE as MODIFIER
 from .muting import mute_deformers, off_meanwhile, unmute_deformers
 from .paths import full
@@ -75,6 +76,7 @@ def renew(path: str, prims: dict[str, str]) -> None:
         prim = prims.get(hair.name_full, modifier.object_path)
         if modifier.object_path != prim:
             modifier.object_path = prim
+        blur.attach(hair)
         with bpy.context.temp_override(edit_cachefile=modifier.cache_file):
             bpy.ops.cachefile.reload()
 
@@ -94,12 +96,14 @@ def attach(hair, path: str, prim: str, scene) -> None:
         index = hair.modifiers.find(MODIFIER)
         if hasattr(hair.modifiers, "move"):
             hair.modifiers.move(index, 0)
+    blur.attach(hair)
 
 
 def detach(hair) -> bool:
     """Remove the cache, and let the hair follow its surface as before; returns whether there was one."""
     if not has_cache(hair):
         return False
+    blur.detach(hair)
     modifier = hair.modifiers[MODIFIER]
     cache, original = modifier.cache_file, _original(hair, modifier)
     if original is None:

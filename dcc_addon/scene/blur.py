@@ -10,8 +10,10 @@ from . import curves
 from .nodes import geometry_nodes
 
 NAME = "Neuralocks Motion Blur"
+CACHED = "Neuralocks Cache Blur"
+"""The same for hair that plays a cache: it stays with the cache, also in files."""
 TREE = f".{NAME}"
-"""The dot keeps it out of menus. It stays in the session, and in no file, because files only hold data with users."""
+"""The dot keeps it out of menus. It stays in the session; in files only for hair with a cache, as they only hold data with users."""
 VELOCITY = "velocity"
 """The attribute that Cycles reads."""
 
@@ -30,6 +32,29 @@ def has_velocities(hair) -> bool:
     return VELOCITY in hair.data.attributes
 
 
+def attach(hair) -> None:
+    """Take velocities of its own off hair that plays a cache: one with samples between the frames has none, and Blender 4.2 reads
+    none.
+    """
+    modifier = hair.modifiers.get(CACHED)
+    if modifier is None and has_velocities(hair):
+        modifier = hair.modifiers.new(CACHED, "NODES")
+        modifier.node_group = _without_velocities()
+        if hair.override_library is None:  # otherwise Blender keeps it above those from the other file
+            hair.modifiers.move(len(hair.modifiers) - 1, 0)  # below the cache, which may have velocities
+    if modifier is not None:
+        modifier.show_viewport = modifier.show_render = True
+
+
+def detach(hair) -> None:
+    """Give it these velocities back."""
+    modifier = hair.modifiers.get(CACHED)
+    if modifier is not None and hair.override_library is not None and modifier.is_override_data:
+        modifier.show_viewport = modifier.show_render = False  # Blender would bring it back
+    elif modifier is not None:
+        hair.modifiers.remove(modifier)
+
+
 def end() -> None:
     """Remove these modifiers again. Their node group stays: if a scene is rendered into a strip of another, the outer render
     continues, and Blender 5.2 crashes when data that it uses is removed.
@@ -42,7 +67,7 @@ def end() -> None:
 
 def _without_velocities():
     """Geometry nodes that return their input without velocities."""
-    tree = bpy.data.node_groups.get(TREE)
+    tree = bpy.data.node_groups.get((TREE, None))  # not one linked from another file
     if tree is None:
         tree, source, target = geometry_nodes(TREE)
         node = tree.nodes.new("GeometryNodeRemoveAttribute")

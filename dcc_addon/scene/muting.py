@@ -5,7 +5,7 @@ and those that grow more hair beside it use the posed surface. Their settings ar
 
 import json
 
-from . import unbound
+from . import blur, unbound
 from .nodes import inputs_of, read_input, write_input
 from .remembered import remembered
 
@@ -87,7 +87,8 @@ def caches_of_others(hair) -> list[str]:
 
 def on_top(hair) -> list[str]:
     """Names of the modifiers that do more than move the hair, and are not switched off: a cache plays below them."""
-    return [m.name for m in hair.modifiers if (m.show_viewport or m.show_render) and not _only_moves(m)]
+    shown = [m for m in hair.modifiers if m.show_viewport or m.show_render]
+    return [m.name for m in shown if m.name != blur.CACHED and not _only_moves(m)]
 
 
 def _fits(values: list) -> bool:

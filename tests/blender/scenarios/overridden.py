@@ -95,7 +95,8 @@ def cached_in_a_shot(folder: Path) -> None:
     rig = scenes.armature()
     scenes.dance(rig)
     strands = scenes.hair(rig, 20)
-    deform = scenes.surface_deform(strands).name
+    deform, blur = scenes.surface_deform(strands).name, "Neuralocks Cache Blur"
+    strands.data.attributes.new("velocity", "FLOAT_VECTOR", "POINT")
     make_live(rig, strands)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
     assert bpy.ops.neuralocks.bake_attach(filepath="//library.usdc") == {"FINISHED"}
@@ -110,7 +111,7 @@ def cached_in_a_shot(folder: Path) -> None:
     def on(strands) -> dict:
         return {m.name: m.show_viewport and m.show_render for m in strands.modifiers}
 
-    assert on(strands) == {"Neuralocks Cache": True, deform: False}
+    assert on(strands) == {blur: True, "Neuralocks Cache": True, deform: False}
     for file in ("library", "shot"):
         cached = points_at(strands, 1010)
         assert bpy.ops.neuralocks.detach() == {"FINISHED"}
@@ -118,7 +119,7 @@ def cached_in_a_shot(folder: Path) -> None:
         assert apart(still, cached) > 0.001, file
         _opened_again(folder)
         strands = _own("CURVES")
-        assert on(strands) == {"Neuralocks Cache": False, deform: True} and not has_cache(strands), file
+        assert on(strands) == {blur: False, "Neuralocks Cache": False, deform: True} and not has_cache(strands), file
         assert [cache.name_full.partition(" ")[0] for cache in bpy.data.cache_files] == ["library.usdc"]
         assert apart(points_at(strands, 1010), still) < 1e-6, file
         if file == "library":
@@ -126,7 +127,7 @@ def cached_in_a_shot(folder: Path) -> None:
             cached = points_at(strands, 1010)
             _opened_again(folder)
             strands = _own("CURVES")
-            assert on(strands) == {"Neuralocks Cache": True, deform: False}
+            assert on(strands) == {blur: True, "Neuralocks Cache": True, deform: False}
             assert apart(points_at(strands, 1010), cached) < 1e-6
             assert apart(cached, baked_points(folder / "shot.usdc", "/Character/Hair_Hair", 1010)) < SAME
 
