@@ -7,11 +7,12 @@ from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP
 
+from .hair_notes import hair_notes
 from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
+from .scene import imported
 from .scene.actions import has_keys
 from .scene.attach import has_cache, stretched_since
-from .scene.muting import caches_of_others, off_meanwhile
 from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
 from .services.remaining import in_words
@@ -145,26 +146,10 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             done = session.preparing[hair.name_full][0].done
             progress(layout, done, f"Preparing {100 * done:.0f} %, Live cancels")
         message(layout, hair.name_full)
-        prepared = session.hairs.get(hair.name_full)
-        if prepared is not None and (fact := prepared.hair.another_body):
-            words(
-                layout,
-                f"The model was trained on another body: {fact}; if it shows, train one for this character",
-                "INFO",
-            )
-        if prepared is not None and (far := prepared.hair.off_skin):
-            words(
-                layout,
-                f"Its roots are {far:.2g} m from the skin; put its object where the head is in the rest pose",
-                "INFO",
-            )
-        if prepared is not None and not prepared.hair.model.feels_wind and own.armature.neuralocks_character.wind > 0:
-            words(layout, "The model is for held poses, so this hair feels no wind", "INFO")
-        if off := off_meanwhile(hair):
-            words(layout, f"Off while Live, or the hair would move twice: {', '.join(off)}", "INFO")
-        for cache in caches_of_others(hair):
-            shape = f"'{cache}' may have left it in the shape of a moved frame"
-            words(layout, f"{shape}; if so, import the groom at rest", "INFO")
+        for text in hair_notes(hair):
+            words(layout, text, "INFO")
+        if own.live and imported.has_file(hair):
+            layout.operator("neuralocks.rest_from_file", icon="IMPORT")
         column = layout.column(align=True)
         for slider in SLIDERS:
             column.prop(own, slider.name, slider=True)

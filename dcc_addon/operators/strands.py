@@ -5,11 +5,14 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..live import refresh
-from ..scene import particles
+from ..live_strands import show_rest
+from ..scene import imported, particles
 from ..scene.attach import check_own
 from ..scene.binding import carrier
 from ..services.sliders import SLIDERS
-from .base import ONCE, Hardened, shown_armature, shown_hair
+from ..services.threaded import loading
+from ..session import session
+from .base import ONCE, Hardened, Stepwise, shown_armature, shown_hair
 
 
 class NEURALOCKS_OT_from_particles(Hardened, bpy.types.Operator):
@@ -68,4 +71,26 @@ class NEURALOCKS_OT_assign(Hardened, bpy.types.Operator):
         return f"{hair.name_full} belongs to {armature.name_full}"
 
 
-CLASSES = (NEURALOCKS_OT_from_particles, NEURALOCKS_OT_reset_look, NEURALOCKS_OT_assign)
+class NEURALOCKS_OT_rest_from_file(Stepwise, bpy.types.Operator):
+    """Give hair that was imported with its motion the rest shape that its USD file has. Hair that was edited since stays as it is"""
+
+    bl_idname = "neuralocks.rest_from_file"
+    bl_label = "Rest Shape from File"
+
+    def steps(self, context):
+        hair = shown_hair(context)
+        check_own(hair)
+        yield from loading("usd.shot.imported")
+        path = imported.take_rest(hair)
+        session.forget(hair.name_full)
+        show_rest(hair)
+        refresh(context.scene)
+        return f"{hair.name_full}: has the rest shape of {path}"
+
+
+CLASSES = (
+    NEURALOCKS_OT_from_particles,
+    NEURALOCKS_OT_reset_look,
+    NEURALOCKS_OT_assign,
+    NEURALOCKS_OT_rest_from_file,
+)

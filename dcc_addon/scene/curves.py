@@ -123,6 +123,12 @@ def keep_rest(data, whole: bool = False) -> None:
     put_aside(data, _read(data, "position"))
 
 
+def replace_rest(data, values: np.ndarray) -> None:
+    """Store (P, 3) float32 as rest shape instead of the one there is; the errors are those of `keep_rest`."""
+    keep_rest(data)
+    _keep(data, values)
+
+
 def put_aside(data, values: np.ndarray) -> None:
     """Store (P, 3) float32 as rest shape if none is stored."""
     stale = data.attributes.get(REST)

@@ -77,12 +77,11 @@ def off_meanwhile(hair) -> list[str]:
     return [name for name in dict.fromkeys(found) if name in hair.modifiers]
 
 
-def caches_of_others(hair) -> list[str]:
-    """Names of those of them that play a cache which is not of this add-on: an importer makes the shape of one of its frames the
-    shape of the curves.
+def caches_of_others(hair) -> list:
+    """Modifiers that play a cache which is not of this add-on: an importer makes the shape of one of its frames the shape of the
+    curves.
     """
-    named = [hair.modifiers[name] for name in off_meanwhile(hair)]
-    return [m.name for m in named if m.type == "MESH_SEQUENCE_CACHE" and m.name != CACHE]
+    return [m for m in hair.modifiers if m.type == "MESH_SEQUENCE_CACHE" and m.name != CACHE]
 
 
 def on_top(hair) -> list[str]:

@@ -222,22 +222,6 @@ def blurred_alike(folder: Path) -> None:
     assert stage.GetAttributeAtPath("/Character/Hair_Hair.velocities").GetNumTimeSamples()
 
 
-def imported_moving(folder: Path) -> None:
-    """Live hair that was imported with its motion, whose curves have the shape of a moved frame, is told so; hair that plays a cache
-    of this add-on has its rest shape.
-    """
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
-    for name, told in (("Neuralocks Cache", False), ("MeshSequenceCache", True)):
-        if strands.modifiers.new(name, "MESH_SEQUENCE_CACHE") is None:
-            raise SkipTest("hair has no modifiers in this Blender")
-        make_live(rig, strands)
-        assert ("the shape of a moved frame" in " ".join(drawn())) == told, name
-        strands.neuralocks_hair.live = False
-        assert "the shape of a moved frame" not in " ".join(drawn())
-
-
 def _drawn(strands, frame: int) -> tuple:
     """Points (N, 3) of the curves with their steps in between, as geometry nodes get them, largest radius, and bounds
     (2, 3), all in the object's space.

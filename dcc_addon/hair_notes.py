@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an artist should know about a hair object, in the words of the panel."""
+
+from .scene import imported
+from .scene.muting import off_meanwhile
+from .session import session
+
+
+def hair_notes(hair) -> list[str]:
+    """The notes on a hair object as it is now."""
+    own, prepared, found = hair.neuralocks_hair, session.hairs.get(hair.name_full), []
+    if prepared is not None:
+        if fact := prepared.hair.another_body:
+            found.append(f"The model was trained on another body: {fact}; if it shows, train one for this character")
+        if far := prepared.hair.off_skin:
+            found.append(f"Its roots are {far:.2g} m from the skin; put its object where the head is in the rest pose")
+        if not prepared.hair.model.feels_wind and own.armature.neuralocks_character.wind > 0:
+            found.append("The model is for held poses, so this hair feels no wind")
+    if off := off_meanwhile(hair):
+        found.append(f"Off while Live, or the hair would move twice: {', '.join(off)}")
+    if own.live and (modifier := imported.shaped_by(hair)) is not None:
+        remedy = "take that from its file, or import it at rest" if imported.has_file(hair) else "import it at rest"
+        found.append(f"'{modifier.name}' may have left it in the shape of a moved frame, not at rest; if so, {remedy}")
+    return found
