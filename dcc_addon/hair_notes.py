@@ -14,7 +14,8 @@ def hair_notes(hair) -> list[str]:
             found.append(f"The model was trained on another body: {fact}; if it shows, train one for this character")
         if far := prepared.hair.off_skin:
             found.append(f"Its roots are {far:.2g} m from the skin; put its object where the head is in the rest pose")
-        if not prepared.hair.model.feels_wind and own.armature.neuralocks_character.wind > 0:
+        blown = own.armature is not None and own.armature.neuralocks_character.wind > 0
+        if blown and not prepared.hair.model.feels_wind:
             found.append("The model is for held poses, so this hair feels no wind")
     if off := off_meanwhile(hair):
         found.append(f"Off while Live, or the hair would move twice: {', '.join(off)}")

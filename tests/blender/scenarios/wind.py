@@ -105,3 +105,15 @@ def wind_in_bones(folder: Path) -> None:
         assert "they feel no wind" in " ".join(drawn())
         assert bpy.ops.neuralocks.export_skel(filepath=str(folder / "held.usdc")) == {"FINISHED"}
     assert "they feel no wind" not in " ".join(drawn())
+
+
+def character_deleted(folder: Path) -> None:
+    """The panel is drawn, without a word on wind, when the character of hair that feels none has been deleted."""
+    rig = scenes.armature()
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    rig.neuralocks_character.wind = 3.0
+    with patch("neuralocks_core.runtime.StrandModel.feels_wind", False):
+        assert "hair feels no wind" in " ".join(drawn())
+        bpy.data.objects.remove(rig)
+        assert "hair feels no wind" not in " ".join(drawn())
