@@ -56,10 +56,14 @@ def shot_beside(out: Path) -> Path:
 
 
 def is_anothers(out: Path, character: str) -> bool:
-    """Whether an existing bake `out` belongs to another character than the one of this full name."""
+    """Whether an existing bake `out` belongs to another character than the one of this full name, or it or its shot to what was
+    imported from it.
+    """
     from usd.assets.own_layers import character_of
 
     shot = shot_beside(out)
+    if any(attach.is_imported(str(path)) for path in (out, shot)):
+        return True
     return shot.is_file() and character_of(shot) not in ("", character)
 
 
@@ -111,7 +115,8 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
 
     free = untaken(Path(full), label, lambda path: any(is_anothers(out, character) for out in _outs(path, len(looks))))
     if free != Path(full):
-        notes.append(f"{full}: it belongs to another character and is kept; this bake is written to {free.name}")
+        owner = "another character, or to what was imported from it,"
+        notes.append(f"{full}: it belongs to {owner} and is kept; this bake is written to {free.name}")
     outs = _outs(free, len(looks))
     groups = [(out, *group) for out, group in zip(outs, looks)]
     for out, _, names in groups:

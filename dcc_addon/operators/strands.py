@@ -78,9 +78,9 @@ class NEURALOCKS_OT_rest_from_file(Stepwise, bpy.types.Operator):
     bl_label = "Rest Shape from File"
 
     def steps(self, context):
+        yield from loading("usd.shot.imported")
         hair = shown_hair(context)
         check_own(hair)
-        yield from loading("usd.shot.imported")
         path = imported.take_rest(hair)
         session.forget(hair.name_full)
         show_rest(hair)

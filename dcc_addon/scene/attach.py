@@ -69,6 +69,16 @@ def players(path: str) -> list:
     ]
 
 
+def is_imported(path: str) -> bool:
+    """Whether something in this file was imported from the USD file `path`, and still plays it: not the add-on's own caches."""
+    for thing in bpy.data.objects:
+        found = [m for m in thing.modifiers if m.type == "MESH_SEQUENCE_CACHE" and m.name != MODIFIER]
+        found += [c for c in thing.constraints if c.type == "TRANSFORM_CACHE"]
+        if any(each.cache_file is not None and _is(each.cache_file, path) for each in found):
+            return True
+    return False
+
+
 def renew(path: str, prims: dict[str, str]) -> None:
     """Show what has just been written to the USD file `path` on the hair that plays it: its prim of `prims`, by its name."""
     for hair in players(path):

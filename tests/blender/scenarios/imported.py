@@ -8,7 +8,7 @@ import bpy
 
 from dcc_addon.scene import curves
 from tests.blender import scenes
-from tests.blender.checks import apart, baked_points, make_live, messages, needs_usd, points_at, refused
+from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused
 from tests.blender.panel import drawn
 
 
@@ -26,6 +26,29 @@ def imported_moving(folder: Path) -> None:
         assert ("the shape of a moved frame" in " ".join(drawn())) == told, name
         strands.neuralocks_hair.live = False
         assert "the shape of a moved frame" not in " ".join(drawn())
+
+
+def imported_from_is_kept(folder: Path) -> None:
+    """A bake to the file, or to the shot, from which something was imported is written beside it: what plays it stays as it is."""
+    needs_usd()
+    operators, rig, out = bpy.ops.neuralocks, scenes.armature(), folder / "neuralocks_bake.usdc"
+    scenes.dance(rig)
+    make_live(rig, scenes.hair(rig, 20))
+    assert operators.bake(filepath=str(out)) == {"FINISHED"}
+    shot = folder / "neuralocks_bake_shot.usdc"
+    for source in (out, shot):
+        scenes.empty()
+        bpy.ops.wm.usd_import(filepath=str(source))
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))  # the panel's output is beside it
+        rig, strands = (next(o for o in bpy.data.objects if o.type == kind) for kind in ("ARMATURE", "CURVES"))
+        make_live(rig, strands)
+        before, live = (out.read_bytes(), shot.read_bytes()), points_at(strands, 9)
+        for bake in (operators.bake_attach, operators.bake):
+            assert bake() == {"FINISHED"}
+            assert (out.read_bytes(), shot.read_bytes()) == before, source
+            assert apart(points_at(strands, 9), live) < SAME, source
+        for made in set(folder.glob("*.usdc")) - {out, shot}:
+            made.unlink()
 
 
 def rest_from_file(folder: Path) -> None:
