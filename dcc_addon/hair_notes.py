@@ -19,7 +19,6 @@ def hair_notes(hair) -> list[str]:
             found.append("The model is for held poses, so this hair feels no wind")
     if off := off_meanwhile(hair):
         found.append(f"Off while Live, or the hair would move twice: {', '.join(off)}")
-    if own.live and (modifier := imported.shaped_by(hair)) is not None:
-        remedy = "take that from its file, or import it at rest" if imported.has_file(hair) else "import it at rest"
-        found.append(f"'{modifier.name}' may have left it in the shape of a moved frame, not at rest; if so, {remedy}")
+    if own.armature is not None and (doubt := imported.doubt(hair)):
+        found.append(doubt)
     return found

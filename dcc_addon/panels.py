@@ -148,7 +148,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         message(layout, hair.name_full)
         for text in hair_notes(hair):
             words(layout, text, "INFO")
-        if own.live and imported.has_file(hair):
+        if own.armature is not None and imported.has_file(hair):
             layout.operator("neuralocks.rest_from_file", icon="IMPORT")
         column = layout.column(align=True)
         for slider in SLIDERS:

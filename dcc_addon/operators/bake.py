@@ -13,7 +13,7 @@ from neuralocks_core.errors import NeuralocksError
 from ..live import refresh
 from ..live_strands import show_rest
 from ..looks import grouped
-from ..scene import attach
+from ..scene import attach, imported
 from ..scene.carried import hairs_of
 from ..scene.export import write_shot
 from ..scene.lookup import named
@@ -108,6 +108,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
             f"{armature.name_full}: no hair belongs to this character; attach a hair object in the panel"
         )
     looks, notes = grouped(hairs, undrawn)
+    notes += [f"{hair.name_full}: {doubt}" for hair in hairs if (doubt := imported.doubt(hair))]
     character, label, subframes = armature.name_full, file_label(armature.name), scene.neuralocks.subframes
     yield from loading("usd.baking.bake", "usd.assets.own_layers", "usd.assets.scene_writer")
     from usd.assets.own_layers import is_own

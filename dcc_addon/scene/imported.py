@@ -26,6 +26,15 @@ def has_file(hair) -> bool:
     return cache is not None and cache.filepath.lower().endswith((".usd", ".usda", ".usdc", ".usdz"))
 
 
+def doubt(hair) -> str:
+    """The note on hair whose shape may not be its rest shape; empty if there is no reason to doubt it."""
+    modifier = shaped_by(hair)
+    if modifier is None:
+        return ""
+    remedy = "press Rest Shape from File, or import it at rest" if has_file(hair) else "import it at rest"
+    return f"'{modifier.name}' may have left it in the shape of a moved frame, not at rest; if so, {remedy}"
+
+
 def take_rest(hair) -> str:
     """Give hair the rest shape that its file has, if its shape is still the one that it was imported in; returns the file's path.
     The caller shows it.

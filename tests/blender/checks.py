@@ -3,6 +3,7 @@
 
 import os
 from unittest import SkipTest
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -50,6 +51,13 @@ def refused(call, *words):
         assert all(word in text for word in words), text
     else:
         raise AssertionError(f"not refused: {result}")
+
+
+def told_by(operator, **options) -> list[str]:
+    """What a bake operator reports besides that it is done."""
+    with patch("dcc_addon.operators.bake.tell") as tell:
+        assert operator(**options) == {"FINISHED"}
+    return tell.call_args.args[2]
 
 
 def needs_usd():

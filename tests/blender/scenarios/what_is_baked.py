@@ -13,7 +13,7 @@ from dcc_addon.scene import curves
 from dcc_addon.services.trainers import Trainers
 from dcc_addon.session import session
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, points_at, refused
+from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, points_at, refused, told_by
 
 
 def too_little_hair(folder: Path) -> None:
@@ -42,7 +42,7 @@ def too_little_hair(folder: Path) -> None:
     strands = scenes.hair(rig, 20)
     make_live(rig, strands)
     empty.neuralocks_hair.armature = rig
-    told = _told(operators.bake)
+    told = told_by(operators.bake)
     assert any("Empty" in line and line.endswith("(left out)") for line in told), told
     assert apart(baked_points(folder / "hair.usdc", "/Character/Hair_Hair", 9), points_at(strands, 9)) < SAME
 
@@ -58,7 +58,7 @@ def hidden_in_renders(folder: Path) -> None:
     make_live(rig, strands)
     out = folder / "hair.usdc"
     scene.neuralocks.output, scene.neuralocks.hair = str(out), backup
-    assert not [line for line in _told(bpy.ops.neuralocks.bake) if "Backup" in line]
+    assert not [line for line in told_by(bpy.ops.neuralocks.bake) if "Backup" in line]
     assert _drawn(out) == {"Hair_Hair", "Hair_Backup"}
     old = bpy.data.collections.new("Old")
     scene.collection.children.link(old)
@@ -67,7 +67,7 @@ def hidden_in_renders(folder: Path) -> None:
     layer = bpy.context.view_layer.layer_collection.children["Old"]
     for holder, setting in ((backup, "hide_render"), (old, "hide_render"), (layer, "exclude")):
         setattr(holder, setting, True)
-        told = _told(bpy.ops.neuralocks.bake)
+        told = told_by(bpy.ops.neuralocks.bake)
         assert any(line.startswith("Backup: it is hidden in renders") for line in told), (setting, told)
         assert _drawn(out) == {"Hair_Hair"}
         setattr(holder, setting, False)
@@ -77,7 +77,7 @@ def hidden_in_renders(folder: Path) -> None:
         assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "alone.usdc")) == {"FINISHED"}
         assert _drawn(folder / "alone.usdc") == {"Hair_Backup"}
     curves.write(backup.data, np.full((len(backup.data.points), 3), np.nan, np.float32))
-    told = _told(bpy.ops.neuralocks.bake)
+    told = told_by(bpy.ops.neuralocks.bake)
     assert any(line.startswith("Backup: some points are not finite") for line in told), told
     assert _drawn(out) == {"Hair_Hair"}
     backup.keyframe_insert("hide_render", frame=3)
@@ -114,7 +114,7 @@ def told_of_a_bake(folder: Path) -> None:
     strands.neuralocks_hair.live = False
     curves.write(strands.data, first.astype(np.float32))
     scene.neuralocks.output = str(folder / "hair.usdc")
-    told = _told(bpy.ops.neuralocks.bake)
+    told = told_by(bpy.ops.neuralocks.bake)
     for begin, words in (("Hero: its head jumps to another place at 13", "anew"), ("前髪: 1 of 20 strands", "rigidly")):
         assert any(line.startswith(begin) and words in line for line in told), told
     assert not any("/Character" in line or "--" in line for line in told), told
@@ -122,13 +122,6 @@ def told_of_a_bake(folder: Path) -> None:
     card = session.cards[strands.name_full]
     assert any(line.startswith("前髪: 1 of 20 strands") for line in card), card
     assert not any("/Character" in line or "--" in line for line in card), card
-
-
-def _told(operator, **options) -> list[str]:
-    """What a bake operator reports besides that it is done."""
-    with patch("dcc_addon.operators.bake.tell") as tell:
-        assert operator(**options) == {"FINISHED"}
-    return tell.call_args.args[2]
 
 
 def _drawn(path: Path) -> set[str]:
