@@ -251,7 +251,7 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
         row.operator("neuralocks.bake_attach", icon="LINKED")
         taking = row.row(align=True)
         hair = settings.hair
-        taking.enabled = hair is not None and has_cache(hair)
+        taking.enabled = hair is not None and (has_cache(hair) or bool(hair.neuralocks_hair.replaced))
         taking.operator("neuralocks.detach", text="", icon="X")
         if hair is not None and not hair.neuralocks_hair.live and stretched_since(hair, context.scene):
             words(layout, f"{hair.name_full}: {STRETCHED}", "ERROR")

@@ -111,9 +111,10 @@ def attach(hair, path: str, prim: str, scene) -> None:
 
 def detach(hair) -> bool:
     """Remove the cache, and let the hair follow its surface as before; returns whether there was one."""
-    if not has_cache(hair):
-        return False
     blur.detach(hair)
+    if not has_cache(hair):  # it may have been removed by hand
+        unmute_deformers(hair, REPLACED)
+        return False
     modifier = hair.modifiers[MODIFIER]
     cache, original = modifier.cache_file, _original(hair, modifier)
     if original is None:

@@ -110,6 +110,9 @@ def taken_off(folder: Path) -> None:
         assert deform.show_viewport and deform.show_render, "the hair stays behind its surface"
         assert [modifier.name for modifier in strands.modifiers] == [deform.name] and not messages(), messages()
         assert not bpy.data.cache_files, "a cache that nothing plays goes into the file"
+    assert operators.bake_attach() == {"FINISHED"}
+    strands.modifiers.remove(strands.modifiers["Neuralocks Cache"])  # by hand
+    assert operators.detach() == {"FINISHED"} and deform.show_viewport and deform.show_render
 
 
 def stretched_since(folder: Path) -> None:

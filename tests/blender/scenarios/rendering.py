@@ -209,6 +209,8 @@ def own_velocities(folder: Path) -> None:
         bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
         scene, strands = bpy.context.scene, bpy.data.objects["Hair"]
         assert (velocity() is None) == (samples == 4 or bpy.app.version < (4, 5)), samples
+        if samples == 4:
+            strands.modifiers.remove(strands.modifiers["Neuralocks Cache"])
         assert bpy.ops.neuralocks.detach() == {"FINISHED"}
         assert velocity() == 7.0 and not strands.modifiers
 
