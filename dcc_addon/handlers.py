@@ -51,6 +51,8 @@ def on_update(scene, graph):
             session.weights.pop(thing.name_full, None)
     objects = {o.name_full: o for o in changed if isinstance(o, bpy.types.Object)}
     show_rest_left([o.original for o in objects.values()])
+    if live.bereft(scene):
+        live.update(scene, graph)
     names = {a.name_full for a in live.carriers(scene)}
     if not names:
         return

@@ -107,6 +107,15 @@ def forget_gone() -> None:
             del told[name]
 
 
+def bereft(scene) -> bool:
+    """Whether hair of the scene is still shown as an armature moved it that has been deleted."""
+    if not session.written:
+        return False
+    moved = (hair for hair in lively(scene.objects).hairs if hair.name_full in session.written)
+    found = (hair.neuralocks_hair.armature for hair in moved)
+    return any(armature is None or not in_scene(armature, scene) for armature in found)
+
+
 def carriers(scene) -> list:
     """Armatures of the scene with something live on them, by name."""
     own = lively(scene.objects)

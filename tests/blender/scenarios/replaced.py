@@ -9,7 +9,7 @@ import numpy as np
 
 from dcc_addon.scene import curves
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, make_live, messages, points_at, refused
+from tests.blender.checks import MODEL, SAME, apart, choose, make_live, messages, points_at, refused
 
 
 def later_groom(folder: Path) -> None:
@@ -37,6 +37,32 @@ def later_groom(folder: Path) -> None:
     assert strands.name == "Hair" and bpy.ops.neuralocks.assign() == {"FINISHED"}
     assert apart(scenes.points(strands), expected[0]) < SAME < apart(*expected)
     assert apart(points_at(strands, 9), expected[0]) < SAME and not messages(), messages()
+
+
+def character_gone(_folder: Path) -> None:
+    """When the character of live hair is deleted, the hair is at rest and told so at once; it is live again after Attach."""
+    for by_script in (True, False):
+        scenes.empty()
+        rig = scenes.armature()
+        scenes.dance(rig)
+        strands = scenes.hair(rig, 20)
+        rest = curves.points(strands.data)
+        make_live(rig, strands)
+        live = points_at(strands, 9)
+        assert apart(curves.shown(strands.data), rest) > 0.01
+        if by_script:
+            bpy.data.objects.remove(rig)
+        else:
+            choose(rig)
+            bpy.ops.object.delete()
+        bpy.context.view_layer.update()
+        assert apart(curves.shown(strands.data), rest) == 0, "it hangs where the character was"
+        assert "no armature in this scene" in messages()["Hair"]
+        bpy.context.scene.neuralocks.armature = rig = scenes.armature("Other")
+        scenes.dance(rig)
+        strands.parent = rig
+        assert bpy.ops.neuralocks.assign() == {"FINISHED"} and bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        assert apart(points_at(strands, 9), live) < SAME and not messages(), messages()
 
 
 def exchanged(_folder: Path) -> None:
