@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bake to USD, bake and attach, report card."""
 
+import errno
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -34,7 +35,8 @@ def output_path(path: str) -> str:
     """Absolute path of a bake.
 
     Raises:
-        NeuralocksError: it is relative to a file that is not saved, it is a folder, or its folder cannot be written.
+        NeuralocksError: it is relative to a file that is not saved, it is a folder, its folder cannot be written, or its name is too
+            long.
     """
     if not path.strip():
         raise NeuralocksError("Output: no file is named; choose where the bake is written")
@@ -47,6 +49,11 @@ def output_path(path: str) -> str:
     folder = next((p for p in Path(full).parents if os.path.isdir(p)), None)  # missing folders are made
     if folder is None or not os.access(folder, os.W_OK):
         raise NeuralocksError(f"{full}: the folder cannot be written; choose another one")
+    try:
+        os.lstat(shot_beside(Path(full)))
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise NeuralocksError(f"{full}: its name is too long for this disk; choose a shorter one") from None
     return full
 
 

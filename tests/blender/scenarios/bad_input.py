@@ -211,7 +211,7 @@ def no_file(folder: Path) -> None:
 
 
 def into_a_folder(folder: Path) -> None:
-    """A bake needs the name of a file: nobody would look for it beside a folder, under the folder's name."""
+    """A bake needs the name of a file, which the disk can hold: nobody would look for it beside a folder, under the folder's name."""
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
     strands, operators = scenes.hair(rig, 10), bpy.ops.neuralocks
@@ -220,6 +220,7 @@ def into_a_folder(folder: Path) -> None:
     for write in (operators.bake, operators.export_skel):
         for path in (f"{folder}/there", f"{folder}/there/", f"{folder}/other/"):
             refused(lambda write=write, path=path: write(filepath=path), path, "folder", "name a file")
+        refused(lambda write=write: write(filepath=f"{folder}/{'x' * 300}"), "too long", "choose a shorter one")
     assert [each.name for each in folder.iterdir()] == ["there"] and not any((folder / "there").iterdir())
 
 
