@@ -5,6 +5,8 @@ from collections.abc import Mapping
 
 HELD, HELD_BEGUN = "held out", "held out, begun with"
 """Keys of a strand model's report for the gauge on held-out motion and strands."""
+KEPT = "strands held out"
+"""Key of a strand model's training: how many strands of each groom, 0 where it has too few locks."""
 NO_BETTER = 1.02
 """A training whose error is more than this many times that of the model it began with is reported; less may be chance."""
 
@@ -25,7 +27,7 @@ def _of_strands(report: Mapping) -> list[str]:
     error, begun = (_number(report, name, "motion") for name in (HELD, HELD_BEGUN))
     if error is None:
         return []
-    unseen = f"its motion error on motion and strands that it never saw is {error:.2f}, where"
+    unseen = f"its motion error on motion that it never saw is {error:.2f}, where"
     if error > 1:
         return [f"{unseen} hair carried rigidly has 1"]
     if begun is not None and error > NO_BETTER * begun:

@@ -44,7 +44,8 @@ class TrainingScene:
         seed: of all random choices.
         frames: length of a rollout, in steps of `spec.dt`.
         strands: strands of a rollout, in whole locks.
-        held_out: draw from locks and random numbers that training never sees.
+        held_out: draw what training never sees: other locks, other random numbers, and no `clips`, since training cuts from all
+            of each.
     """
 
     character: Character
@@ -209,7 +210,8 @@ class RolloutMaker:
 
         scene = self.scene
         span = (scene.frames - 1) * scene.spec.dt
-        clips = [clip for clip in scene.clips if clip.end - clip.start > 0.6 * span]
+        captured = () if scene.held_out else scene.clips
+        clips = [clip for clip in captured if clip.end - clip.start > 0.6 * span]
         if clips and rng.random() < 0.35:
             source = clips[rng.integers(len(clips))]
             start = rng.uniform(source.start, max(source.start, source.end - span))
@@ -256,3 +258,8 @@ def held_out_split(groom: StrandSet, held_out: bool) -> np.ndarray:
     kept_back = (groom.lock % 8 == 7) == held_out
     usable = np.flatnonzero(groom.valid & kept_back)
     return usable if len(usable) else np.flatnonzero(groom.valid)
+
+
+def kept_from_training(groom: StrandSet) -> int:
+    """How many strands `held_out_split` keeps from training; 0 if there are too few locks."""
+    return len(np.setdiff1d(held_out_split(groom, True), held_out_split(groom, False)))

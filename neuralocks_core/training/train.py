@@ -17,7 +17,7 @@ import torch
 from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
-from neuralocks_core.shortcomings import HELD, HELD_BEGUN
+from neuralocks_core.shortcomings import HELD, HELD_BEGUN, KEPT
 from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
@@ -31,7 +31,7 @@ from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.option_checks import changed, check_options
 from neuralocks_core.training.regression import RolloutBank
 from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import TrainingScene, learned_measures
+from neuralocks_core.training.rollouts import TrainingScene, kept_from_training, learned_measures
 from neuralocks_core.training.threads import threads
 from neuralocks_core.training.work import (
     CODES,
@@ -267,10 +267,13 @@ class _Reporter:
 
 
 def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginning | None) -> dict:
-    """For the card: measures of the body, strands of each groom, and the source of their codes, or the codes' error."""
+    """For the card: measures of the body, strands of each groom, how many of them are held out, and the source of their codes, or
+    the codes' error.
+    """
     lowest, highest = learned_measures(scene.character).round(4).tolist()
     strands = {"measures": {"lowest": lowest, "highest": highest}}
     strands["strands"] = [int(groom.valid.sum()) for groom in scene.grooms]
+    strands[KEPT] = [kept_from_training(groom) for groom in scene.grooms]
     if beginning:
         return strands | {"began with": beginning.card()}
     errors = [1e3 * coder.errors(scalp_local(groom)[groom.valid]).mean() for groom in scene.grooms if groom.valid.any()]

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.shortcomings import HELD, HELD_BEGUN
+from neuralocks_core.shortcomings import HELD, HELD_BEGUN, KEPT
 
 from .command import note, noting_when_cut_short, print_json
 from .options import AsJson, Head, Joints, Out, Seed, Skeleton, pairs
@@ -98,15 +98,16 @@ def train_command(
         print_json({"model": str(path), "training": meta["training"], "report": meta["report"]})
         return
     typer.echo(f"{path}: {meta['training']['steps']:,} steps in {meta['training']['minutes']:g} min")
-    typer.echo(_reached(meta["report"]))
+    typer.echo(_reached(meta["report"], all(meta["training"].get(KEPT, []))))
 
 
-def _reached(report: dict) -> str:
-    """What a training's report says, for a terminal."""
+def _reached(report: dict, strands_too: bool) -> str:
+    """What a training's report says, for a terminal; `strands_too`: its strands are held out as well."""
     held, begun = report[HELD], report.get(HELD_BEGUN)
+    unseen = "motion and strands" if strands_too else "motion"
     before = f", the model that it began with {begun['motion']:.2f}" if begun else ""
     return (
-        f"on motion and strands that it never saw: motion error {held['motion']:.2f} (hair carried rigidly 1{before}), "
+        f"on {unseen} that it never saw: motion error {held['motion']:.2f} (hair carried rigidly 1{before}), "
         f"motion {held['motion_ratio']:.0%} of the solver's, position {held['position']:.1f} % of strand length off "
         f"(rigidly {held['rigid']:.1f} %)"
     )

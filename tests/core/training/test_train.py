@@ -24,7 +24,7 @@ from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression import RolloutBank
 from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene, held_out_split, in_steps
+from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene, held_out_split, in_steps, kept_from_training
 from neuralocks_core.training.train import train_strands
 from neuralocks_core.training.work import claimed
 
@@ -98,7 +98,21 @@ def test_another_history_reads_the_same_simulation(scene):
 def test_held_out_strands_are_never_trained_on(scene):
     groom = scene.grooms[0]
     assert not set(held_out_split(groom, True)) & set(held_out_split(groom, False))
-    assert len(held_out_split(groom, True)) > 0
+    assert len(held_out_split(groom, True)) == kept_from_training(groom) > 0
+    few = replace(groom, lock=groom.lock % 7)
+    assert np.array_equal(held_out_split(few, True), held_out_split(few, False)) and kept_from_training(few) == 0
+
+
+def test_held_out_motion_is_never_trained_on(scene):
+    """Training cuts from all of each clip, however often; what is held out is made up."""
+    clips = tuple(scripted_clip(scene.character, kind, 8.0) for kind in ("walk", "nod"))
+    given = replace(scene, clips=clips)
+    taken = [
+        [maker.draw(i).clip.times[-1] for i in range(20)]
+        for maker in map(RolloutMaker, (given, replace(given, held_out=True)))
+    ]
+    lengths = {float(clip.times[-1]) for clip in clips}
+    assert lengths & set(map(float, taken[0])) and not lengths & set(map(float, taken[1]))
 
 
 def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(scene, tmp_path, monkeypatch):

@@ -150,7 +150,7 @@ def test_inspect_tells_of_a_model_that_moves_hair_worse_than_not_at_all(tmp_path
         file = model_file.read(path)
         model_file.write(path, {**file.meta, "report": {"held out": {"motion": motion}}}, file.graphs)
         assert status("inspect", path) == 0
-        assert capsys.readouterr().out.count("its motion error on motion and strands that it never saw is 1.30") == told
+        assert capsys.readouterr().out.count("its motion error on motion that it never saw is 1.30") == told
 
 
 def test_memory_that_torch_lacks_is_one_line(capsys):

@@ -74,23 +74,29 @@ def test_what_was_reached_is_told(tmp_path, capsys, monkeypatch):
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
     plain = model_file.read(write_random_model(tmp_path / "plain.neuralocks", 1.0))
     held = {"motion": 0.314, "motion_ratio": 0.91, "position": 2.13, "rigid": 9.9}
-    training = {"steps": 1204, "minutes": 2.0}
+    training = {"steps": 1204, "minutes": 2.0, "strands held out": [400]}
 
     def train(character, grooms, motion, out, settings, **others):
         return model_file.write(out, {**plain.meta, "report": report, "training": training}, plain.graphs)
 
     monkeypatch.setattr("usd.models.train.train", train)
     words = ("train", "--character", "c.usda", "-o", tmp_path / "m.neuralocks")
-    for before, told in (
-        ({}, "1)"),
-        ({"held out, begun with": {"motion": 0.35}}, "1, the model that it began with 0.35)"),
+    for before, told, kept, unseen in (
+        ({}, "1)", [400], "motion and strands"),
+        (
+            {"held out, begun with": {"motion": 0.35}},
+            "1, the model that it began with 0.35)",
+            [400],
+            "motion and strands",
+        ),
+        ({}, "1)", [400, 0], "motion"),  # too few locks to hold any back
     ):
-        report = {"held out": held, **before}
+        report, training["strands held out"] = {"held out": held, **before}, kept
         assert status(*words) == 0
         lines = capsys.readouterr().out.splitlines()
         assert lines == [
             f"{tmp_path}/m.neuralocks: 1,204 steps in 2 min",
-            f"on motion and strands that it never saw: motion error 0.31 (hair carried rigidly {told}, motion 91% of the "
+            f"on {unseen} that it never saw: motion error 0.31 (hair carried rigidly {told}, motion 91% of the "
             "solver's, position 2.1 % of strand length off (rigidly 9.9 %)",
         ]
     assert status(*words, "--json") == 0
