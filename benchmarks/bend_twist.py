@@ -4,16 +4,21 @@
     python benchmarks/bend_twist.py [--strands 300 3000] [--threads 2] [--device cuda]
 
 The paper gives 0.16 s for its fast transport, 0.98 s for the exact one and 0.14 s for Quaffure's. Times here are the
-smallest of several rounds in which the forms take turns, so that their ratios are valid on a busy machine too.
+smallest of several rounds in which the forms take turns, so that their ratios are valid on a busy machine too. It takes
+about a minute.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
 import time
 
-import torch
+try:
+    import torch
+except ModuleNotFoundError:
+    sys.exit('bend_twist: torch: is not installed; pip install ".[train]"')
 
 from neuralocks_core.physics.bend_twist import Cosserat, bend_difference, bend_twist
 from neuralocks_core.physics.gravity import gravity

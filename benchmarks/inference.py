@@ -4,7 +4,7 @@
     python benchmarks/inference.py [MODEL] [--threads 2]
 
 Times are medians of repeated calls, all in one run; compare the ratios, not the milliseconds of two machines. Run it
-on an idle machine. It needs the extra `train`, which includes onnx.
+on an idle machine. It needs the extra `train`, which includes onnx. It takes about a minute.
 """
 
 import argparse
@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import plain_errors  # noqa: F401
 
 from neuralocks_core.network_sizes import HIDDEN, SHAPE
 

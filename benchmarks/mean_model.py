@@ -14,6 +14,7 @@ import argparse
 from copy import deepcopy
 from pathlib import Path
 
+import plain_errors  # noqa: F401
 import torch
 
 

@@ -9,6 +9,7 @@ The shapes are matrices of the shipped networks. Times are the smallest of sever
 import argparse
 import time
 
+import plain_errors  # noqa: F401
 import torch
 
 from neuralocks_core.training.muon import Muon

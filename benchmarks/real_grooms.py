@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import plain_errors  # noqa: F401
 
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles.fitting import sphere

@@ -4,7 +4,8 @@
     python benchmarks/reference_speed.py [--strands N] [--frames T] [--device cpu|cuda] [--body V]
 
 One warp thread per strand; on a CPU warp runs on one core. Error: distance to the reference at 16 and 32 substeps,
-extrapolated to ever shorter steps, in percent of how far the hair moved; stretch: mean and worst, in percent.
+extrapolated to ever shorter steps, in percent of how far the hair moved; stretch: mean and worst, in percent. On one
+core, all takes about two minutes at 3,000 strands.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+import plain_errors  # noqa: F401
 
 from neuralocks_core.reference import simulate, simulate_xpbd
 

@@ -4,7 +4,7 @@
     python benchmarks/rig_speed.py [--joints 16] [--json]
 
 Every evaluation has different inputs. C programs are built with gcc; times are the best of 300 runs of 4,096 evaluations
-(1.2 million in all), so that other work on the machine does not count.
+(1.2 million in all), so that other work on the machine does not count. It takes some seconds.
 """
 
 import argparse

@@ -14,6 +14,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import plain_errors  # noqa: F401
 import torch
 
 from neuralocks_core.boundary_spec import BoundarySpec

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+import plain_errors  # noqa: F401
 
 from neuralocks_core import model
 
