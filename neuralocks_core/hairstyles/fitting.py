@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import WIDTH, Groom
 from neuralocks_core.hairstyles.scalp import Scalp
+from neuralocks_core.rotation import unit
 
 FEWEST = 4
 """Roots that determine a sphere."""
@@ -19,6 +21,15 @@ OFF = 0.2
 """A root this far off the sphere, relative to its radius, such as that of a tail's hair tie, does not count."""
 DOUBT = 0.12
 """Largest share by which the radius of a head may be in doubt: whole heads of hair have 0.05 to 0.09, fringes and tails 0.2."""
+
+ASIDE = 0.35
+"""A root in a direction from the middle of the head that is this far from all directions of the scalp [rad] does not count, such as
+a beard's.
+"""
+ROUNDS = 5
+"""How often it is asked which roots count."""
+AWAY = 0.2
+"""A root this far from the scalp, relative to the head's radius, is not on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +40,13 @@ class Fitted:
         grooms: in the scalp's space [m].
         scale: how many times as large as it was the hair is now.
         moved: how far each strand with vertices was moved to bring its root onto the skin, (S,) [m].
+        off: the share of each groom's roots that are not on the scalp.
     """
 
     grooms: list[Groom]
     scale: float
     moved: np.ndarray
+    off: list[float]
 
 
 def fit(grooms: Sequence[Groom], scalp: Scalp, skin: Collider, resize: bool = True) -> Fitted:
@@ -59,26 +72,57 @@ def fit(grooms: Sequence[Groom], scalp: Scalp, skin: Collider, resize: bool = Tr
         raise NeuralocksError(
             "groom: all its roots are in one place, which does not tell where the head is; place it yourself"
         )
-    middle, wanted = sphere(scalp.points[np.unique(scalp.triangles)])
-    centre, radius = sphere(every)
-    if not resize:
-        centre, radius = _of_radius(every, centre, wanted), wanted
-    elif not _doubt(every, centre, radius) <= DOUBT:
+    on_scalp = scalp.points[np.unique(scalp.triangles)]
+    middle, wanted = sphere(on_scalp)
+    used, centre, radius = _head(every, on_scalp - middle, None if resize else wanted)
+    if resize and not _doubt(used, centre, radius) <= DOUBT:
         raise NeuralocksError(
             "groom: its roots are on too small a part of a head to tell how large that is; import it together with the other "
             "parts of that hair, or give --unit"
         )
-    scale, found, moved = wanted / radius, [], []
+    scale, found, moved, off = wanted / radius, [], [], []
+    hairy = Collider(scalp.points, scalp.triangles)
     for each, own in zip(grooms, roots):
         onto = np.zeros((each.strand_count, 3))
-        distance, normal = skin.distance((own - centre) * scale + middle, limit=np.inf)
+        own = (own - centre) * scale + middle
+        distance, normal = skin.distance(own, limit=np.inf)
         onto[each.counts > 0] = -distance[:, None] * normal
+        far = np.abs(hairy.distance(own - distance[:, None] * normal, limit=np.inf)[0])
+        off.append(float(np.mean(far > AWAY * wanted)) if len(own) else 0.0)
         points = (each.points - centre) * scale + middle + np.repeat(onto, each.counts, axis=0)
         # A thickness that the file did not state is that of hair, whatever the head's size.
         widths = each.widths if (each.widths == WIDTH).all() else np.float32(scale) * each.widths
         found.append(replace(each, points=points.astype(np.float32), widths=widths))
         moved.append(np.abs(distance))
-    return Fitted(found, scale, np.concatenate(moved))
+    return Fitted(found, scale, np.concatenate(moved), off)
+
+
+def _head(roots: np.ndarray, scalp: np.ndarray, radius: float | None) -> tuple[np.ndarray, np.ndarray, float]:
+    """The roots (n, 3) that tell where the head is, and the centre (3,) and radius of the sphere through them.
+
+    They are all, or, if these suffice, those that lie in a direction of the scalp: a beard's are far from the skull's sphere.
+
+    Args:
+        roots: (N, 3).
+        scalp: points (V, 3) relative to the middle of the head.
+        radius: the sphere's, if it is known.
+    """
+    ways = cKDTree(unit(scalp))
+    found = used, centre, size = roots, *_sphere(roots, radius)
+    for _ in range(ROUNDS):
+        over = roots[ways.query(unit(roots - centre))[0] < ASIDE]
+        if len(over) < FEWEST or len(over) == len(used):
+            break
+        used, (centre, size) = over, _sphere(over, radius)
+        if _doubt(used, centre, size) > DOUBT:
+            break
+        found = used, centre, size
+    return found
+
+
+def _sphere(points: np.ndarray, radius: float | None) -> tuple[np.ndarray, float]:
+    centre, found = sphere(points)
+    return (centre, found) if radius is None else (_of_radius(points, centre, radius), radius)
 
 
 def sphere(points: np.ndarray) -> tuple[np.ndarray, float]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.head_field import HeadField
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
@@ -22,6 +23,9 @@ from ..border.stage_files import check_layer_name, check_not_input, check_not_ov
 from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
 from .groom import Over, write_groom
+
+HOLLOW = 0.003
+"""Skin of the head that is deeper than this [m] where its hollows count as inside is in one of them."""
 
 _SEEN, _GROWN = 120, 930
 """Progress, in thousandths of the work for many strands, once the head is read and once the hair is grown."""
@@ -88,9 +92,7 @@ class Barber:
 
     def fitted(self, grooms: Sequence[Groom], resize: bool) -> Fitted:
         """Grooms that were made for another head, on this one, in bind-world metres; see `fitting.fit`."""
-        triangles = self.character.body.triangles
-        skin = Collider(self._scalp.points, triangles[self.character.skin[triangles[:, 0]]])
-        found = fit(grooms, self._scalp, skin, resize)
+        found = fit(grooms, self._scalp, Collider(self._scalp.points, self._open_skin), resize)
         turned = [replace(g, points=(g.points @ self.character.facing).astype(np.float32)) for g in found.grooms]
         return replace(found, grooms=turned)
 
@@ -98,9 +100,22 @@ class Barber:
     def _scalp(self) -> Scalp:
         # Styles are grown facing +Z, around the head's own position.
         centre = self.character.facing @ self.character.canonical_to_bind[:3, 3] + self.character.head_centre
-        points, triangles = self.character.body.points @ self.character.facing.T, self.character.body.triangles
+        points = self.character.body.points @ self.character.facing.T
+        return from_head(points, self._skin, centre)
+
+    @cached_property
+    def _skin(self) -> np.ndarray:
         # Hair does not grow on a hat.
-        return from_head(points, triangles[self.character.skin[triangles[:, 0]]], centre)
+        triangles = self.character.body.triangles
+        return triangles[self.character.skin[triangles[:, 0]]]
+
+    @property
+    def _open_skin(self) -> np.ndarray:
+        # Nor in a mouth, a nostril or an eye's socket.
+        character = self.character
+        points = character.canonical(character.body.points) / character.times_human
+        depth = HeadField(points, self._skin, character.on_head).distance(points[self._skin].mean(axis=1))[0]
+        return self._skin[depth > -HOLLOW]
 
     @cached_property
     def _obstacle(self) -> Obstacle:

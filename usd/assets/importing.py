@@ -30,6 +30,8 @@ from .prims import Spline
 
 _READ, _LAID = 400, 950
 """Progress, in thousandths of the work, once the files are read and once the hair is on the head and out of the body."""
+_OFF = 0.1
+"""A larger share of roots off the scalp is told: a hairline that is lower than another's has a hundredth."""
 
 
 def import_groom(
@@ -84,8 +86,8 @@ def import_groom(
     if rig:
         subject = ", ".join(map(str, sources))
         with about(subject):
-            found, told = _put_on(rig, found, unit is None, within(say, _READ, _LAID))
-        notes.append(f"{subject}: {told}")
+            found, told, elsewhere = _put_on(rig, found, unit is None, within(say, _READ, _LAID))
+        notes += [f"{subject}: {told}", *elsewhere]
     say(_LAID, 1000, f"writing {out.name}")
     over = Over(rig, as_path(character, "character")) if rig and with_character else None
     write_grooms(out, found, rig and rig.border, over)
@@ -113,8 +115,8 @@ def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]
     return [Authored(groom, beside=Beside(_primvars(look)))], notes
 
 
-def _put_on(rig: StageRig, found: list[Authored], resize: bool, say: Progress) -> tuple[list[Authored], str]:
-    """The hair on a character's head and out of its body, in bind world, and how it was put there."""
+def _put_on(rig: StageRig, found: list[Authored], resize: bool, say: Progress) -> tuple[list[Authored], str, list[str]]:
+    """The hair on a character's head and out of its body, in bind world; how it was put there; notes on roots off the scalp."""
     say(0, len(found), "putting it on the head")
     fitted, on, laid = Barber(rig.character).fitted([each.groom for each in found], resize), [], []
     for number, (each, groom) in enumerate(zip(found, fitted.grooms)):
@@ -131,7 +133,14 @@ def _put_on(rig: StageRig, found: list[Authored], resize: bool, say: Progress) -
     )
     if (laid > 1e-3).any():
         told += f", and {(laid > 1e-3).sum()} that went into the body were laid over it, by {1e3 * laid.max():.0f} mm at most"
-    return on, told
+    elsewhere = [
+        f"{each.groom.name}: {100 * off:.0f}% of its roots lie off the scalp, on the face, the neck or the body; if they do not "
+        "belong there, turn the hair to face forward (+Z if Y is up, -Y if Z is), check --up, or import it together with the "
+        "other parts of that hair"
+        for each, off in zip(found, fitted.off)
+        if off > _OFF
+    ]
+    return on, told, elsewhere
 
 
 def _primvars(look: Look) -> tuple[Primvar, ...]:

@@ -99,6 +99,17 @@ def test_parts_of_one_head_stay_together(head):
     assert apart[1].points.reshape(-1, 3, 3) == pytest.approx(together[~left], abs=1e-5)
 
 
+def test_roots_below_the_scalp_do_not_count_and_are_told(head):
+    """As many as the hair's: where the hair lies and its size stay the same."""
+    hairy, rng = hair([0, 0, 0], 1.0), np.random.default_rng(2)
+    chin = rng.normal([0, -1.3, 0.8], 0.15, (300, 1, 3)) + np.array([[0, 0, 0], [0, -0.2, 0]])
+    beard = Groom("beard", chin.reshape(-1, 3).astype(np.float32), np.full(300, 2), np.full(1, 1e-2, np.float32))
+    alone, both = fit([hairy], *head), fit([hairy, beard], *head)
+    assert both.scale == pytest.approx(alone.scale, rel=1e-3)
+    assert both.grooms[0].points == pytest.approx(alone.grooms[0].points, abs=1e-4)
+    assert alone.off == [0.0] and both.off[0] == 0.0 and both.off[1] > 0.95
+
+
 def test_empty_strands_are_kept(head):
     full = hair([0, 0, 0], 1.0, count=20)
     counts = full.counts.copy()

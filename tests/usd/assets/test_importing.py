@@ -2,12 +2,14 @@
 """Hair files put on a character's head, from file to bake."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom
 
+from neuralocks_core.body.head_field import HeadField
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from tests.core.formats.groom_files import put, tressfx_text
@@ -44,6 +46,34 @@ def test_hair_is_put_back_where_it_grew(foreign, tmp_path):
     body = read_rigs(BODY)[0].surface
     assert np.abs(body.distance(groom.points[groom.starts])[0]).max() < 1e-5
     assert any("put on the head of /Body/Rig, made 0.0269 times as large; strands" in note for note in notes), notes
+
+
+def test_a_beard_does_not_move_the_hair_it_is_imported_with(foreign, tmp_path):
+    """Its roots are far from the skull's sphere: the hair became a fifth smaller, and the beard sat below the eyes."""
+    rig = read_rigs(BODY)[0]
+    character, skin = rig.character, rig.character.body.points
+    at = character.canonical(skin) - character.head_centre
+    chin = skin[character.on_head & (at[:, 1] < -0.08) & (at[:, 1] > -0.13) & (at[:, 2] > 0.05)]
+    chin = chin[np.argsort(-np.linalg.norm(chin - skin.mean(axis=0), axis=1), kind="stable")[:200]]
+    points = np.stack([chin, chin + [0, -0.03, 0.01]], axis=1).reshape(-1, 3)
+    points = (37 * points + [5, -80, 3]).astype(np.float32)
+    beard = write_groom(tmp_path / "beard.usda", Groom("Beard", points, np.full(200, 2), np.ones(1, np.float32)))
+    (alone,), _ = import_groom(foreign, tmp_path / "alone.usda", character=BODY)
+    (hair, on), notes = import_groom([foreign, beard], tmp_path / "both.usda", character=BODY)
+    assert np.linalg.norm(hair.points - alone.points, axis=1).max() < 0.003
+    assert np.median(np.linalg.norm(on.points[::2] - chin, axis=1)) < 0.005
+    assert [note.split(" of its")[0] for note in notes if "off the scalp" in note] == ["/Groom/Beard: 100%"]
+
+
+def test_hair_that_faces_backwards_is_told_and_stays_out_of_the_mouth(foreign, tmp_path):
+    """A third of it grows from the face, but not from the insides of the lips, where no bake could get it out."""
+    (groom,), _ = import_groom(foreign, tmp_path / "as_it_is.usda")
+    turned = write_groom(tmp_path / "back.usda", replace(groom, points=groom.points * np.float32([-1, 1, -1])))
+    (groom,), notes = import_groom(turned, tmp_path / "on.usda", character=BODY)
+    assert any("of its roots lie off the scalp" in note and "turn the hair to face forward" in note for note in notes)
+    character = read_rigs(BODY)[0].character
+    field = HeadField(character.canonical(character.body.points), character.body.triangles, character.on_head)
+    assert field.distance(character.canonical(groom.points[groom.starts]))[0].min() > -0.004
 
 
 def test_of_a_stated_unit_the_size_stays(foreign, tmp_path):
