@@ -119,19 +119,24 @@ def read_with_look(
     return groom, look, notes
 
 
-def common_unit(paths: Sequence[str | Path]) -> float | None:
-    """The unit [m] that suits the roots of several files with parts of one head of hair, none of which states its own; None if one
-    does, or if their roots tell nothing.
+def common_unit(paths: Sequence[str | Path], sized: bool = False) -> float | None:
+    """The unit [m] that suits the roots of several files with parts of one head of hair; None if one of them has a unit of its own, or
+    if their roots tell nothing.
+
+    Args:
+        paths: the files.
+        sized: the hair gets the size of a head anyway, so that a unit which all of them have, right or wrong, does not matter.
 
     Raises:
         NeuralocksError: as `read`.
     """
-    roots = []
+    roots, units = [], set()
     for path in map(Path, paths):
         raw = _raw(path, _content(path))
-        if raw.unit is not None:
-            return None
+        units.add(raw.unit)
         roots.append(_roots(raw, raw.points))
+    if len(units) > 1 or units != {None} and not sized:
+        return None
     scalp = _scalp(np.concatenate(roots))
     return _likely_unit(scalp) if 0 < scalp < np.inf else None
 

@@ -95,14 +95,14 @@ def import_groom(
 
 
 def _common_unit(sources: list[Path], sized: bool) -> float | None:
-    """The unit of hair files of which none states its own: one for all parts of a head; None to let each file's reader find it, and
-    tell. Where a head sizes the hair, it need not be told.
+    """One unit for all parts of a head, if they leave it open; None to let each file's reader find it, and tell. Where a head sizes the
+    hair, it need not be told.
     """
     if len(sources) < 2 and not sized or any(path.suffix.lower() in (*USD, *OTHERS) for path in sources):
         return None
     from neuralocks_core import formats
 
-    return formats.common_unit(sources)
+    return formats.common_unit(sources, sized)
 
 
 def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:

@@ -76,6 +76,19 @@ def test_hair_that_faces_backwards_is_told_and_stays_out_of_the_mouth(foreign, t
     assert field.distance(character.canonical(groom.points[groom.starts]))[0].min() > -0.004
 
 
+def test_a_unit_is_not_asked_for_where_the_head_sizes_the_hair(foreign, tmp_path):
+    """A file of metres by its format, but written in another unit; whoever followed that advice got hair that was not sized."""
+    (groom,), _ = import_groom(foreign, tmp_path / "as_it_is.usda")
+    strands = np.split(groom.points, groom.starts[1:])
+    parts = [np.int32(len(points)).tobytes() + points.astype("<f4").tobytes() for points in strands]
+    file = put(tmp_path, "hair.data", np.int32(len(parts)).tobytes() + b"".join(parts))
+    assert any("import --unit" in note for note in import_groom(file, tmp_path / "raw.usda")[1])
+    (on,), notes = import_groom(file, tmp_path / "on.usda", character=BODY)
+    assert not any("--unit" in note for note in notes)
+    (same,), _ = import_groom(foreign, tmp_path / "same.usda", character=BODY)
+    assert on.points == pytest.approx(same.points, abs=1e-5)
+
+
 def test_of_a_stated_unit_the_size_stays(foreign, tmp_path):
     (groom,), notes = import_groom(foreign, tmp_path / "fitted.usda", "cm", character=BODY)
     lengths = [
