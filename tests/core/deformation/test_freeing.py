@@ -60,3 +60,26 @@ def test_hair_under_a_helmet_stays_there():
     groom = Groom("Hair", points.reshape(-1, 3), np.full(40, 24))
     laid, moved = freed(groom, character)
     assert not moved.any() and np.array_equal(laid.points, groom.points)
+
+
+def test_a_hat_is_no_obstacle():
+    """Hair that goes in under its rim was crumpled between it and the skin."""
+    bare, count = standing(1.0), len(BALL.vertices)
+    joints = bare.body.joint_indices.copy()
+    joints[:count][BALL.vertices[:, 1] < -0.05] = 0  # skin goes on from the head into the neck, a hat does not
+    body = Body(bare.body.points, bare.body.triangles, joints, bare.body.joint_weights)
+    above = BALL.faces[BALL.vertices[BALL.faces, 1].min(axis=1) > 0.03]
+    hat = 1.05 * BALL.vertices + bare.skeleton.bind[rigs.HEAD, :3, 3]
+    dressed = Body(
+        np.concatenate([body.points, hat]),
+        np.concatenate([body.triangles, above + len(body.points)]),
+        np.concatenate([joints, np.full((count, 1), rigs.HEAD)]),
+        np.ones((len(body.points) + count, 1)),
+    )
+    own = hanging(1.0, 24)
+    own[:39, :, 1] += 0.2 * (own[:39, :1, 1] - own[:39, :, 1]) ** 0.5  # up a little first, under the rim
+    points = (own + bare.skeleton.bind[rigs.HEAD, :3, 3]).astype(np.float32)
+    groom = Groom("Hair", points.reshape(-1, 3), np.full(40, 24))
+    without, with_hat = (freed(groom, Character(bare.skeleton, each))[0].points for each in (body, dressed))
+    assert not np.array_equal(without, groom.points)
+    np.testing.assert_allclose(with_hat, without, atol=1e-5)
