@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
 from ..shot.notes import asked_notes, out_of_place
-from ..shot.stage import Shot, read_shot
+from ..shot.stage import Shot, check_frames_named, read_shot
 from .samples import write_samples
 
 
@@ -44,11 +43,7 @@ def read_asked(
     (progress or silent)(0, 1, "reading the shot")  # for a crowd, this takes longer than a user waits without a message
     if not isinstance(shot, Shot):
         shot = read_shot(shot, grooms, skeleton, head, joints, cuts, still=wind is not None)
-    if frames is None and shot.first == shot.last and not any(rig.source.animated for rig in shot.rigs):
-        raise NeuralocksError(
-            f"{shot.path}: has neither an animation nor a range of frames; name those in which the wind blows with "
-            "--frames FIRST:LAST"
-        )
+    check_frames_named(shot.path, frames, shot.first, shot.last, shot.rigs)
     return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
 
 

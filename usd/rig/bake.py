@@ -113,7 +113,7 @@ def bake_rig(
     )
     stage = found[0].stage
     check_not_over(out, stage)
-    bound = _each(found, lambda hair: BoundHair.of(hair, model, frames, subframes), left)
+    bound = _each(found, lambda hair: BoundHair.of(hair, model, frames, subframes, blown is not None), left)
     check_cuts(cuts, [one.hair.source for one in bound])
     notes = [*shortcomings("model", "rig", model.report), *map(left_out, left)]
     for one in bound:

@@ -15,7 +15,7 @@ from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
 from ..shot.notes import not_animated, on_twos, without_turn
-from ..shot.stage import frame_range
+from ..shot.stage import check_frames_named, frame_range
 from .layer import kept_hair
 from .notes import mirrored_notes, rigged_notes
 from .stage import RiggedHair
@@ -45,8 +45,8 @@ class BoundHair:
     codes: list[float]
 
     @classmethod
-    def of(cls, hair: RiggedHair, model: RigModel, frames, subframes: int) -> "BoundHair":
-        """Bind a model; `frames` and `subframes` are those of `bake.bake_rig`.
+    def of(cls, hair: RiggedHair, model: RigModel, frames, subframes: int, windy: bool) -> "BoundHair":
+        """Bind a model; `frames` and `subframes` are those of `bake.bake_rig`, `windy` whether a wind blows.
 
         Raises:
             NeuralocksError: it was made for other chains, a joint that it reads cannot be identified, or there are no such frames.
@@ -57,7 +57,10 @@ class BoundHair:
         size = model.chains.check_same(here)
         if stops := without_turn(hair.source, model.spec.pose_joints):
             raise NeuralocksError(stops[0])
-        wanted = time_codes(frames, *frame_range(hair.stage, [hair.source]), subframes, hair.border.frame)
+        first, last = frame_range(hair.stage, [hair.source])
+        if windy:
+            check_frames_named(hair.path, frames, first, last, [hair.source])
+        wanted = time_codes(frames, first, last, subframes, hair.border.frame)
         return cls(hair, model, size, trained_name, wanted, _with_samples(hair, wanted))
 
     @property

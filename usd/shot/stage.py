@@ -199,6 +199,17 @@ def frame_range(stage: Usd.Stage, rigs) -> tuple[float, float]:
     return float(min(r.time_codes[0] for r in rigs)), float(max(r.time_codes[-1] for r in rigs))
 
 
+def check_frames_named(subject, frames, first: float, last: float, rigs) -> None:
+    """Refuse to let a wind blow on rigs without an animation in frames that nothing names: neither `frames` nor a range from the first
+    time code to the last.
+    """
+    if frames is None and first == last and not any(rig.source.animated for rig in rigs):
+        raise NeuralocksError(
+            f"{subject}: has neither an animation nor a range of frames; name those in which the wind blows with "
+            "--frames FIRST:LAST"
+        )
+
+
 def check_cuts(cuts, rigs) -> None:
     """Refuse time codes of cuts at which no rig's animation could have one."""
     for cut in () if isinstance(cuts, dict) else cuts or ():

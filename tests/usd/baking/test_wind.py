@@ -22,7 +22,7 @@ from usd.rig.stage import read_rigged_hair
 from usd.shot.recorded import KEY
 
 from ..commands import status
-from ..rig_shots import hair_turns, model_for, small_shot
+from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 from ..shots import HAIR, Recipe, samples, world_points, write_loop, write_shot
 
 
@@ -170,6 +170,14 @@ def test_wind_moves_the_hair_of_a_head_that_is_held_still(tmp_path):
     notes = bake_rig(shot, tmp_path / "blown.usda", model, wind=(0, 0, -5), gusts=1).notes
     assert not any("held pose" in note for note in notes)
     assert np.abs(np.diff(hair_turns(tmp_path / "blown.usda", [1.0, 9.0, 17.0]), axis=0)).max() > 1e-3
+
+
+def test_a_rig_bake_of_a_character_without_an_animation_is_told_its_frames(tmp_path):
+    """It wrote one frame, without a word."""
+    shot = EXAMPLE / "character.usda"
+    with pytest.raises(NeuralocksError, match="/Body/Rig: has neither an animation nor .*--frames FIRST:LAST"):
+        bake_rig(shot, tmp_path / "out.usda", wind=(3, 0, 0))
+    assert bake_rig(shot, tmp_path / "out.usda", wind=(3, 0, 0), frames="1:5").rigs[0].samples == 5
 
 
 def test_a_rig_bake_records_its_wind_and_a_report_calls_no_gust_jitter(tmp_path):
