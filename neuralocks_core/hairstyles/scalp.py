@@ -135,13 +135,14 @@ class Roots:
         return Roots(self.place[index], self.normal[index], self.border[index])
 
 
-def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray) -> Scalp:
+def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray, size: float = 1.0) -> Scalp:
     """Mark a plausible scalp on a head: above the hairline, the crown and the back down to the nape.
 
     Args:
         points: (V, 3) [m], bind space, Y up, face +Z; of the head or the whole body.
         triangles: (F, 3) int, outward.
         head_centre: (3,) [m], middle of the skull.
+        size: about how many times a person's size a giant is.
 
     Raises:
         NeuralocksError: no part of the mesh is where a scalp would be.
@@ -152,7 +153,7 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     middle = (a + b + c) / 3 - head_centre
     # The skull's radius: up from its centre, where there is nothing but skull.
-    above = (np.hypot(middle[:, 0], middle[:, 2]) < 0.06) & (middle[:, 1] > 0)
+    above = (np.hypot(middle[:, 0], middle[:, 2]) < 0.06 * size) & (middle[:, 1] > 0)
     if not above.any():
         raise NeuralocksError("scalp: no mesh lies above the head's centre; mark the scalp by hand")
     radius = float(middle[above, 1].max())

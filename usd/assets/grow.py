@@ -101,7 +101,7 @@ class Barber:
         # Styles are grown facing +Z, around the head's own position.
         centre = self.character.facing @ self.character.canonical_to_bind[:3, 3] + self.character.head_centre
         points = self.character.body.points @ self.character.facing.T
-        return from_head(points, self._skin, centre)
+        return from_head(points, self._skin, centre, self.character.times_human)
 
     @cached_property
     def _skin(self) -> np.ndarray:

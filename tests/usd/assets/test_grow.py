@@ -126,6 +126,20 @@ def test_hair_grows_on_the_head_below_a_halo_as_without_it(tmp_path):
     assert grown[0].read_bytes() == grown[1].read_bytes()
 
 
+def test_hair_grows_on_giants(tmp_path):
+    """Twenty times life size: no triangle of the crown was as near to the head's axis as a person's."""
+    giant = tmp_path / "giant.usda"
+    stage = Usd.Stage.CreateNew(str(giant))
+    UsdGeom.SetStageMetersPerUnit(stage, 20)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    stage.GetRootLayer().subLayerPaths.append(BODY.as_posix())
+    stage.Save()
+    (large,), _ = import_groom(grow("bob", giant, tmp_path / "large.usda", count=200), tmp_path / "l.usda")
+    (small,), _ = import_groom(grow("bob", BODY, tmp_path / "small.usda", count=200), tmp_path / "s.usda")
+    size = [np.ptp(groom.points, axis=0) for groom in (large, small)]
+    assert size[0] == pytest.approx(20 * size[1], rel=0.05)
+
+
 def test_unknown_styles_are_listed(tmp_path):
     with pytest.raises(NeuralocksError, match="long_straight"):
         grow("mullet", BODY, tmp_path / "x.usda")
