@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -53,6 +53,7 @@ class Scene:
         body_rest: body points in bind pose (V, 3) [m], or None.
         mesh_hair: vertices of the body that are hair (V,) bool, or None.
         look: colours.
+        size: how many times a person's size the character is.
     """
 
     times: np.ndarray
@@ -67,6 +68,24 @@ class Scene:
     body_rest: np.ndarray | None = None
     mesh_hair: np.ndarray | None = None
     look: shading.Look = field(default_factory=shading.Look)
+    size: float = 1.0
+
+    def life_size(self) -> "Scene":
+        """The same with a giant shrunk to a person's size, at which cameras and light know what is near."""
+        if self.size == 1:
+            return self
+        share, head, hair, body = 1 / self.size, self.head.copy(), self.hair, self.body
+        head[:, :3, 3] *= share
+        return replace(
+            self,
+            head=head,
+            centre=share * self.centre,
+            rest=share * self.rest,
+            hair=lambda frame: share * np.asarray(hair(frame), float),
+            body=None if body is None else lambda frame: share * np.asarray(body(frame), float),
+            body_rest=None if self.body_rest is None else share * self.body_rest,
+            size=1.0,
+        )
 
 
 class Film:
@@ -84,7 +103,7 @@ class Film:
     """
 
     def __init__(self, scene: Scene, width: int, height: int, detail: Detail, calm: float, canvas=open_canvas):
-        self.scene, self.detail, self._calm = scene, detail, calm
+        self.scene, self.detail, self._calm = (scene := scene.life_size()), detail, calm
         self._pick(detail.strands)
         self._albedo = None if scene.body_rest is None else self._dress()
         self._follow()

@@ -88,6 +88,7 @@ class Baked:
             triangles=None if body is None else body.triangles,
             body=None if body is None else pose,
             body_rest=None if body is None else body.points,
+            size=character.times_human,
         )
 
 

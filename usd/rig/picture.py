@@ -43,4 +43,5 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
         body=lambda frame: character.posed_body(clip.joints[frame], clip.shape[frame]),
         body_rest=body.points,
         mesh_hair=hair,
+        size=character.times_human,
     )

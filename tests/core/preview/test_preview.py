@@ -56,6 +56,28 @@ def scene(frames=4, strands=300):
     )
 
 
+def test_a_giant_is_drawn_as_a_person():
+    """The camera stood inside of it."""
+    person = scene()
+    head = person.head.copy()
+    head[:, :3, 3] *= 32
+    giant = replace(
+        person,
+        head=head,
+        centre=32 * person.centre,
+        rest=32 * person.rest,
+        hair=lambda frame: 32 * person.hair(frame),
+        body=lambda frame: 32 * person.body(frame),
+        body_rest=32 * person.body_rest,
+        size=32.0,
+    )
+    pictures = []
+    for each in (person, giant):
+        with closing(Film(each, 60, 80, Detail(60, 24, 1, 1), 0.02, plain_canvas.PlainCanvas)) as film:
+            pictures.append(next(film.shoot([1])).astype(int))
+    assert np.abs(pictures[0] - pictures[1]).max() <= 1 and np.ptp(pictures[0]) > 50
+
+
 @pytest.mark.parametrize("samples", [1, 2, 50])
 def test_a_clip_shows_the_nearest_sample_and_of_two_as_near_the_earlier(samples):
     rng = np.random.default_rng(samples)
