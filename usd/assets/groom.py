@@ -14,7 +14,6 @@ from neuralocks_core.strands.strand_set import root_uv
 from ..baking.header import write_header
 from ..border.arrays import floats, integers, row_matrix
 from ..border.stage_files import write_stage
-from ..border.units import Border
 from ..skel.stage_rig import StageRig
 from .beside import Beside
 from .prims import POLYLINES, Spline, author_curves
@@ -64,30 +63,34 @@ class Over:
                 layer.pseudoRoot.ClearInfo(name)
 
 
-def write_groom(path, groom: Groom, border: Border | None = None, over: Over | None = None) -> Path:
+def write_groom(path, groom: Groom, rig: StageRig | None = None, over: Over | None = None) -> Path:
     """Write one groom; see `write_grooms`."""
-    return write_grooms(path, [Authored(groom)], border, over)
+    return write_grooms(path, [Authored(groom)], rig, over)
 
 
-def write_grooms(path, grooms: list[Authored], border: Border | None = None, over: Over | None = None) -> Path:
+def write_grooms(path, grooms: list[Authored], rig: StageRig | None = None, over: Over | None = None) -> Path:
     """Write grooms below a root prim, `/Groom` if that name is free; the file is complete once it has its final name.
 
     Args:
         path: USD file to write.
-        grooms: in metres, Y up.
-        border: of the stage that the grooms are made for, whose unit and axis the file uses; metres and Y up if left out.
+        grooms: in metres, Y up; in bind world, if there is a rig.
+        rig: the character that the grooms are made for. They are placed on its bind pose as its stage shows that, in the unit and axis of
+            its file; metres and Y up if left out.
         over: write a layer over this file.
 
     Raises:
         NeuralocksError: the path has another extension or cannot be written.
     """
 
+    border = rig.border if rig else None
+    place = np.eye(4) if rig is None else rig.source.placement.reference @ np.linalg.inv(rig.to_bind)
+
     def author(stage: Usd.Stage) -> None:
         UsdGeom.SetStageUpAxis(stage, border.up_axis if border else UsdGeom.Tokens.y)
         UsdGeom.SetStageMetersPerUnit(stage, border.metres_per_unit if border else 1.0)
         root = UsdGeom.Xform.Define(stage, _free_path(over.stage if over else stage, Sdf.Path("/"), "Groom"))
-        if border and not np.array_equal(border.from_core, np.eye(4)):
-            root.AddTransformOp().Set(row_matrix(border.from_core))
+        if not np.array_equal(place, np.eye(4)):
+            root.AddTransformOp().Set(row_matrix(place))
         Usd.ModelAPI(root).SetKind("component")
         stage.SetDefaultPrim(root.GetPrim())
         for each in grooms:

@@ -74,7 +74,7 @@ def grow(
     say(0, 1000, "looking at the head")
     groom = Barber(rig.character).grow(style, count, seed, variation, within(say, _SEEN, _GROWN))
     say(_GROWN, 1000, f"writing {out.name}")
-    return write_groom(out, groom, rig.border, Over(rig, as_path(character, "character")) if with_character else None)
+    return write_groom(out, groom, rig, Over(rig, as_path(character, "character")) if with_character else None)
 
 
 class Barber:

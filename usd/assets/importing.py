@@ -90,7 +90,7 @@ def import_groom(
         notes += [f"{subject}: {told}", *elsewhere]
     say(_LAID, 1000, f"writing {out.name}")
     over = Over(rig, as_path(character, "character")) if rig and with_character else None
-    write_grooms(out, found, rig and rig.border, over)
+    write_grooms(out, found, rig, over)
     return [each.groom for each in found], notes
 
 

@@ -9,14 +9,17 @@ import pytest
 import trimesh
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
+from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rotation import from_vector, transformed
 from usd.assets.grow import Barber, grow
 from usd.assets.importing import import_groom
+from usd.baking.bake import bake
 from usd.models import training_scene as training_scene_module
 from usd.models.training_scene import training_scene
 from usd.shot.stage import read_rigs, read_shot
 
-from ..shots import Recipe, write_shot
+from ..shots import HEAD, JOINTS, MOTION, Recipe, world_points, write_shot
 
 BODY = Path(__file__).resolve().parents[3] / "examples" / "shot" / "body.usdc"
 
@@ -124,6 +127,33 @@ def test_hair_grows_on_the_head_below_a_halo_as_without_it(tmp_path):
     stage.Save()
     grown = [grow("bob", body, tmp_path / f"{body.stem}.usda", count=60) for body in (BODY, tmp_path / "angel.usdc")]
     assert grown[0].read_bytes() == grown[1].read_bytes()
+
+
+@pytest.mark.parametrize("change", ["turned", "scaled"])
+def test_hair_sits_where_a_bake_finds_it(tmp_path, model, change):
+    """On a character whose parents turn it, hair sat askew on its head; on one whose head the animation scales, no bake found it."""
+    turn = np.eye(4)
+    turn[:3, :3] = from_vector(np.array([0, np.radians(140), 0]))
+    turn[:3, 3] = 2, 0, -1
+    shot = write_shot(tmp_path, Recipe(bound="mesh", place=turn if change == "turned" else None))
+    if change == "scaled":
+        layer = Sdf.Layer.FindOrOpen(str(shot))
+        scales = [(1, 1, 1)] * len(JOINTS)
+        scales[HEAD] = (1.5, 1.5, 1.5)
+        layer.GetAttributeAtPath(f"{MOTION}.scales").default = Vt.Vec3hArray(scales)
+        layer.Save()
+    rig = read_rigs(shot)[0]
+    grown = Barber(rig.character).grow("bob", 200, 0)
+    out = grow("bob", shot, tmp_path / "grown.usda", count=200, with_character=True)
+    (item,) = read_shot(out, ["/Groom/bob"]).grooms
+    assert item.groom.points == pytest.approx(grown.points, abs=1e-5)
+    bake(out, tmp_path / "hair.usdc", model, grooms=["/Groom/bob"])
+    if change == "turned":  # and so before a bake
+        skin = Collider(
+            transformed(rig.character.body.points, turn @ np.linalg.inv(rig.to_bind)), rig.character.body.triangles
+        )
+        roots = world_points(out, 1.0, "/Groom/bob")[grown.starts]
+        assert np.abs(skin.distance(roots, limit=0.1)[0]).max() < 1e-3
 
 
 def test_hair_grows_on_giants(tmp_path):
