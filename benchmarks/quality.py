@@ -98,15 +98,17 @@ class Bench:
         """Collision vertices at rest, canonical (V, 3)."""
         return self.character.canonical(self.body.shaped(self.shape))
 
-    def predicted(self, sessions: dict, style: str, model: StrandModel, clip, times, mirror=False) -> np.ndarray:
+    def predicted(
+        self, sessions: dict, style: str, model: StrandModel, clip, times, mirror=False, material=None
+    ) -> np.ndarray:
         """The network's displacement (T, n, 24, 3); with `mirror`, its output for the same in a mirror, mirrored back."""
         key = (id(model), style, mirror)
         if key not in sessions:
             groom = self.styles[style]
             sessions[key] = StrandSession(model, mirrored_strands(groom) if mirror else groom)
         clip = replace(clip, shape=np.tile(self.shape, (len(clip.times), 1)))
-        sampler = model.sampler(self.character, clip)
-        read = np.concatenate([sampler.held_bind(shape=self.shape)[None], sampler.vectors(times)])
+        sampler, made_of = model.sampler(self.character, clip), (material or Material()).log_ratios()
+        read = np.concatenate([sampler.held_bind(made_of, shape=self.shape)[None], sampler.vectors(times, made_of)])
         bind, *vectors = mirrored_vectors(model.spec, read) if mirror else read
         sessions[key].anchor(bind)
         moved = np.stack([sessions[key].displacement(v)[self.chosen[style]] for v in vectors])
@@ -153,6 +155,9 @@ def main() -> None:
     parser.add_argument(
         "--fine", type=int, default=0, help="also how far the solver's own time step is from so many in its place"
     )
+    parser.add_argument(
+        "--damping", type=float, default=Material().damping, help="of the network's hair in the comparison with --fine"
+    )
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     bench = Bench(arguments.character, arguments.style, arguments.groom, arguments.shape)
@@ -170,7 +175,8 @@ def main() -> None:
     for kind, clip in clips.items():
         times = np.arange(clip.start, min(clip.end, clip.start + arguments.seconds), DT)
         for style in bench.styles:
-            rows.append(measured(bench, style, kind, clip, times, models, sessions, arguments.floor, arguments.fine))
+            fine = arguments.fine, Material(damping=arguments.damping)
+            rows.append(measured(bench, style, kind, clip, times, models, sessions, arguments.floor, *fine))
     if arguments.json:
         print(json.dumps(rows, indent=1, default=float))
         return
@@ -178,7 +184,9 @@ def main() -> None:
         table(rows, by)
 
 
-def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bool, fine: int) -> dict:
+def measured(
+    bench: Bench, style, kind, clip, times, models, sessions, floor: bool, fine: int, beside_fine: Material
+) -> dict:
     """All numbers of one style in one clip."""
     given, keywords = bench.setting(style, clip, times)
     rest, heads, posed = given[:3]
@@ -214,7 +222,7 @@ def measured(bench: Bench, style, kind, clip, times, models, sessions, floor: bo
             row["still jitter mm"] = metrics.jitter(points[still]) if still.sum() > 1 else float("nan")
     if fine:
         finer = simulate(*given, substeps=fine, **keywords).points
-        answer = rest + bench.predicted(sessions, style, models["network"], clip, times)
+        answer = rest + bench.predicted(sessions, style, models["network"], clip, times, material=beside_fine)
         for who, each in (("solver", truth), ("network", answer)):
             row[f"{who} beside fine: motion"] = metrics.motion_error(each, finer, length)["median"]
             row[f"{who} beside fine: velocity"] = metrics.velocity_error(each, finer, times)
