@@ -145,7 +145,7 @@ def _content(path: Path) -> bytes:
     try:
         if not path.is_file():
             fact = "is not a file" if path.exists() else "there is no such file"
-            raise NeuralocksError(f"{path}: {fact}; give a groom file ({' '.join(EXTENSIONS)})")
+            raise NeuralocksError(f"{path}: {fact}; give a groom file ({' '.join(EXTENSIONS)}, or USD curves)")
         size = path.stat().st_size
         if size > LARGEST_FILE:
             raise bad_file(str(path), f"has {size} bytes, more than the {LARGEST_FILE} that are read", "split it")

@@ -155,7 +155,9 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
     # The skull's radius: up from its centre, where there is nothing but skull.
     above = (np.hypot(middle[:, 0], middle[:, 2]) < 0.06 * size) & (middle[:, 1] > 0)
     if not above.any():
-        raise NeuralocksError("scalp: no mesh lies above the head's centre; mark the scalp by hand")
+        raise NeuralocksError(
+            "scalp: no mesh lies above the head's centre; choose another head joint, or give the body with its head"
+        )
     radius = float(middle[above, 1].max())
     seen = middle / radius
     skull = seen[(seen[:, 1] > 0.35) & (np.linalg.norm(seen, axis=1) < 1.5)]
@@ -168,5 +170,7 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
     ear = (np.abs(seen[:, 0]) > 0.78) & (seen[:, 1] < 0.05)
     chosen = (seen[:, 1] > up) & outward & (size > 0.6) & (size < 1.5) & ~ear
     if not chosen.any():
-        raise NeuralocksError("scalp: nothing of the mesh lies above the hairline; mark the scalp by hand")
+        raise NeuralocksError(
+            "scalp: nothing of the mesh lies above the hairline; choose another head joint, or give the body with its head"
+        )
     return Scalp(points, triangles[chosen], head_centre)

@@ -96,19 +96,14 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     read = POSE_JOINTS if curves else RIG_JOINTS
     for rig in rigs:
         stops += without_turn(rig, read)
-        spoils += (
-            rig.notes
-            + rig_notes(rig, read)
-            + another_head(rig)
-            + lies_down(rig)
-            + partial_body(rig, parts_elsewhere(rig, rigs)[1])
-        )
+        spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + lies_down(rig)
+        spoils += partial_body(rig, parts_elsewhere(rig, rigs)[1])
         spoils += [] if told else rig.cut_notes()
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))
         spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
-    elif rigs:
+    elif rigs and not any("wind" in recorded(prim) for prim in curves):
         stops.append(not_animated(rigs[0]))
     search = HairSearch(rigs, head, spoils)
     grooms = facts_of_grooms(search, curves, border, spoils, stops)

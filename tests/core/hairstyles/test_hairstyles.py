@@ -192,7 +192,7 @@ def test_a_mouth_is_no_room_for_hair():
         (lambda: Scalp(np.full((3, 3), np.nan), [[0, 1, 2]], CENTRE), "not finite"),
         (lambda: grow("bob", None, 10), "scalp: None is not one; give a Scalp"),
         (lambda: grow("bob", SCALP, 10, body=(BODY[0] + 9, BODY[1])), "same space"),
-        (lambda: from_head(BODY[0] - [0, 5, 0], BODY[1], CENTRE), "by hand"),
+        (lambda: from_head(BODY[0] - [0, 5, 0], BODY[1], CENTRE), "choose another head joint"),
     ],
 )
 def test_bad_input_is_named(call, message):

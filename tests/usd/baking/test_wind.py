@@ -133,6 +133,7 @@ def test_wind_moves_the_hair_of_a_character_without_an_animation(tmp_path, model
     assert np.abs(np.diff([world_points(out, code) for code in (1.0, 5.0, 9.0)], axis=0)).max() > 1e-5
     assert evaluate(out).grooms[HAIR]["stretch_percent"] < 0.01
     assert preview(out, tmp_path / "blown.png", size=(60, 80)).exists()
+    assert inspect(shot)["stops"] and not inspect(out)["stops"]
 
 
 def test_hair_that_feels_no_wind_refuses_it(tmp_path):
