@@ -54,6 +54,11 @@ class Body:
             {name: offsets[vertices] for name, offsets in self.shapes.items()},
         )
 
+    def only(self, triangles: np.ndarray) -> "Body":
+        """Some of the triangles (f, 3), with their corners alone."""
+        used, own = np.unique(triangles, return_inverse=True)
+        return self.part(used, own.reshape(-1, 3))
+
     def shaped(self, weights: np.ndarray | None = None) -> np.ndarray:
         """Bind-pose points (V, 3) with blend shape weights (B,), in the order of `shapes`; None means zeros."""
         points = self.points

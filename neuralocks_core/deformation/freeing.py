@@ -37,7 +37,4 @@ def _bareheaded(character: Character) -> Character:
     if body is None:
         return character
     kept = ~(character.on_head & ~character.skin)[body.triangles].any(axis=1)
-    if kept.all():
-        return character
-    used, triangles = np.unique(body.triangles[kept], return_inverse=True)
-    return replace(character, body=body.part(used, triangles.reshape(-1, 3)))
+    return character if kept.all() else replace(character, body=body.only(body.triangles[kept]))

@@ -53,7 +53,7 @@ class Resolver:
     Args:
         character: whose body the hair must stay out of; without a body nothing is done.
         strands: the groom at rest.
-        clip: the motion to come. Skin that hardly moves relative to the head in it is looked up in a grid built once, and blend
+        clip: the motion to come. Skin of the head that hardly moves relative to it is looked up in a grid built once, and blend
             shapes that do not change in it are part of the rest pose.
 
     Attributes:
@@ -131,15 +131,13 @@ class Resolver:
         moved = np.zeros_like(self._rest)
         if self.body is None:
             return moved
-        body = self._posed(self.character.skeleton.bind, self._constant, *_corners(self._rest))
-        for some in range(0, len(moved), PUSHED):
-            rows = slice(some, some + PUSHED)
-            points = self._rest[rows]
-            distance = rest_distance(points, body)
-            inside = (distance[:, 1:] < 0).any(axis=1) & (distance[:, 0] > -WORN) & self.strands.valid[rows]
-            clear = np.where(inside[:, None], np.float32(MARGIN), np.full_like(distance, -np.inf))
+        body, distance = self._rested()
+        inside = np.flatnonzero((distance[:, 1:] < 0).any(axis=1) & (distance[:, 0] > -WORN) & self.strands.valid)
+        for i in range(0, len(inside), PUSHED):
+            rows = inside[i : i + PUSHED]
+            clear = np.full(distance[rows].shape, MARGIN, np.float32)
             clear[:, 0] = -np.inf
-            moved[rows] = resolved(points, body, clear) - points
+            moved[rows] = resolved(self._rest[rows], body, clear) - self._rest[rows]
         return moved * self._size
 
     def _push(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None, each: Callable) -> None:
@@ -170,12 +168,14 @@ class Resolver:
     @cached_property
     def clear(self) -> np.ndarray:
         """Distance (S, 24) float32 [m] that each vertex must keep, at a person's size."""
-        joints = self.character.skeleton.bind
+        return clearance(self._rested()[1])
+
+    def _rested(self) -> tuple[PosedBody, np.ndarray]:
+        """The body in bind pose, and each vertex's signed distance to it there (S, 24) [m], at a person's size."""
         points = self._rest
-        rest = self._posed(joints, self._constant, *_corners(points))
-        return clearance(
-            np.concatenate([rest_distance(points[i : i + BATCH], rest) for i in range(0, len(points), BATCH)])
-        )
+        body = self._posed(self.character.skeleton.bind, self._constant, *_corners(points))
+        parts = [rest_distance(points[i : i + BATCH], body) for i in range(0, len(points), BATCH)]
+        return body, np.concatenate(parts)
 
     @cached_property
     def _deep(self) -> np.ndarray:
@@ -240,7 +240,4 @@ def _within_reach(character: Character, strands: StrandSet) -> Body | None:
     off = np.linalg.norm(character.canonical(body.points) - character.head_centre, axis=1)
     near = off < reach(character, strands)
     faces = body.triangles[near[body.triangles].any(axis=1)]
-    if not len(faces):
-        return None
-    used, triangles = np.unique(faces, return_inverse=True)
-    return body.part(used, triangles.reshape(-1, 3))
+    return body.only(faces) if len(faces) else None

@@ -2,7 +2,6 @@
 """A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
 
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from neuralocks_core.rig.finding import NoHairChains, fits
 from neuralocks_core.rig.measuring import UNEVEN, placed_chains
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
-from neuralocks_core.skinned_body import Body
 
 from ..border.damage import names_damage
 from ..border.prim_paths import prim_path
@@ -26,8 +24,7 @@ from ..border.units import Border
 from ..shot.lacking import has_hair_joints, nothing_found
 from ..shot.notes import partial_body
 from ..shot.others import Others
-from ..shot.skeletons import read_each_rig
-from ..shot.whole_body import parts_elsewhere
+from ..shot.whole_body import whole_body
 from ..skel.source import find_skeletons, read_rig
 from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins
@@ -153,26 +150,18 @@ def read_rigged_hairs(
         *_, kind, text = (hairy or errors)[0]
         raise kind(text)
     if model is None:
-        read = Others(
-            [hair.source for hair in found], find_skeletons(stage), partial(_read_others, stage, border, head)
-        )
-        found = _on_whole_bodies(found, bare if skeleton is None else read.maybe_same())
+        others = bare if skeleton is None else Others([hair.source for hair in found], stage, head, joints).maybe_same()
+        found = _on_whole_bodies(found, others)
     return found, [of_skeleton(path, text) for path, *_, text in hairy]
-
-
-def _read_others(stage: Usd.Stage, border: Border, head: str | None, prims: list[Usd.Prim]) -> list[StageRig]:
-    return read_each_rig(stage, prims, border, head)[0]
 
 
 def _on_whole_bodies(found: list[RiggedHair], others: list[StageRig]) -> list[RiggedHair]:
     """Hair that may touch all meshes of its character, which may be in several skeletons; the hair of these is no body."""
-    every, result = [*(replace(hair.source, character=hair.rig.character) for hair in found), *others], []
-    for hair in found:
-        parts, left = parts_elsewhere(hair.source, every)
-        hair.source.notes.extend(partial_body(hair.source, left))
-        own = hair.rig.character.body
-        whole = hair.rig.with_body(Body.joined([*([] if own is None else [own]), *parts])) if parts else hair.rig
-        result.append(replace(hair, rig=whole))
+    hairless, result = [replace(hair.source, character=hair.rig.character) for hair in found], []
+    for hair, own in zip(found, hairless):
+        body, left = whole_body(own, [*hairless, *others])
+        hair.source.notes.extend(partial_body(own, left))
+        result.append(replace(hair, rig=hair.rig.with_body(body)))
     return result
 
 

@@ -3,7 +3,6 @@
 they are only read if a groom may be theirs or they may be the same person.
 """
 
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -12,10 +11,10 @@ from pxr import Usd
 from neuralocks_core.errors import NeuralocksError
 
 from ..skel.joints import JointSource
+from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .alike import SAME, UPPER
-
-Read = Callable[[list[Usd.Prim]], list[StageRig]]
+from .skeletons import read_each_rig
 
 
 class Others:
@@ -23,13 +22,13 @@ class Others:
 
     Args:
         rigs: those that were named.
-        prims: all Skeletons of the stage.
-        read: reads some of them, as far as they can be used.
+        stage: theirs.
+        head, joints: as for `stage.read_shot`.
     """
 
-    def __init__(self, rigs: list[StageRig], prims: list[Usd.Prim], read: Read):
-        self._named, self._read = rigs, read
-        self._prims = prims
+    def __init__(self, rigs: list[StageRig], stage: Usd.Stage, head: str | None, joints: dict[str, str] | None):
+        self._named, self._stage, self._given = rigs, stage, (head, joints)
+        self._prims = find_skeletons(stage)
         self._paths = {rig.path for rig in rigs}
 
     def __bool__(self) -> bool:
@@ -47,6 +46,11 @@ class Others:
             return self.rigs
         near = [prim for prim in self._prims if str(prim.GetPath()) not in self._paths and self._near(prim)]
         return self._read(near) if near else []
+
+    def _read(self, prims: list[Usd.Prim]) -> list[StageRig]:
+        """Some of the stage's skeletons, as far as they can be used."""
+        head, joints = self._given
+        return read_each_rig(self._stage, prims, self._named[0].border, head, joints=joints)[0]
 
     def _near(self, prim: Usd.Prim) -> bool:
         """Whether a joint of a skeleton is where one of a named character's upper body is, as that one's motion begins and ends."""

@@ -130,7 +130,7 @@ def read_shot(
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
     others = None
     if skeleton is not None and not grooms:
-        others = _others(rigs, stage, border, head, joints)
+        others = Others(rigs, stage, head, joints)
     search = HairSearch(rigs, head, notes, named=bool(grooms), others=others, forced=bool(grooms and skeleton))
     found = _grooms(search, curves, notes)
     no_hair = search.no_hair()
@@ -184,7 +184,7 @@ def read_rigs(
     rigs, unusable = _rigs(stage, border, skeleton, head, Path(path), all_shapes=True, joints=joints)
     first, every = rigs[0], rigs
     if skeleton is not None:
-        every = [*rigs, *_others(rigs, stage, border, head, joints).maybe_same()]
+        every = [*rigs, *Others(rigs, stage, head, joints).maybe_same()]
     body, left = whole_body(first, every)
     first.notes.extend(unusable + partial_body(first, left))
     return replace(first, character=replace(first.character, body=body)), *rigs[1:]
@@ -270,13 +270,6 @@ def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tup
     if errors and (not rigs or skeleton):
         raise errors[0]
     return rigs, few([left_out(error) for error in errors], "skeletons are left out")
-
-
-def _others(rigs: list[StageRig], stage: Usd.Stage, border: Border, head: str | None, joints) -> Others:
-    """The skeletons besides named ones."""
-    return Others(
-        rigs, find_skeletons(stage), lambda prims: read_each_rig(stage, prims, border, head, joints=joints)[0]
-    )
 
 
 def _check_animated(rigs: list[StageRig]) -> None:

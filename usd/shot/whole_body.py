@@ -54,9 +54,8 @@ def _carried(body: Body, counterparts: np.ndarray) -> Body | None:
     faces = body.triangles[kept[body.triangles].all(axis=1)]
     if not len(faces):
         return None
-    moved = Body(body.points, body.triangles, np.maximum(joints, 0), weights / np.maximum(share, CARRIED)[:, None])
-    used, triangles = np.unique(faces, return_inverse=True)
-    return moved.part(used, triangles.reshape(-1, 3))
+    weights /= np.maximum(share, CARRIED)[:, None]
+    return Body(body.points, body.triangles, np.maximum(joints, 0), weights).only(faces)
 
 
 def _counterparts(rig: StageRig, other: StageRig) -> np.ndarray:
