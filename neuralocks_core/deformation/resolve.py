@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.enclosed import enclosed
 from neuralocks_core.body.near_body import NearBody, PosedBody
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.laying import MARGIN, SLACK, clearance, resolved, rest_distance
@@ -126,19 +127,31 @@ class Resolver:
 
     def freed(self) -> np.ndarray:
         """Displacement (S, 24, 3) float32 [m], canonical, that lays strands over the body that they rest in. Their roots stay, and
-        so does hair under something worn.
+        so does hair under something worn, and hair in free air below the rim of an open mesh, a scalp without a neck.
         """
         moved = np.zeros_like(self._rest)
         if self.body is None:
             return moved
         body, distance = self._rested()
         inside = np.flatnonzero((distance[:, 1:] < 0).any(axis=1) & (distance[:, 0] > -WORN) & self.strands.valid)
+        inside = inside[self._truly(inside, distance[inside])]
         for i in range(0, len(inside), PUSHED):
             rows = inside[i : i + PUSHED]
             clear = np.full(distance[rows].shape, MARGIN, np.float32)
             clear[:, 0] = -np.inf
             moved[rows] = resolved(self._rest[rows], body, clear) - self._rest[rows]
         return moved * self._size
+
+    def _truly(self, strands: np.ndarray, distance: np.ndarray) -> np.ndarray:
+        """Which strands' deepest vertex the body encloses, (n,) of their indices and distances (n, 24) [m] at a person's size, if it
+        seems deep: below the rim of an open mesh, the nearest skin has free air on its inner side.
+        """
+        deep, deepest = distance.min(axis=1, initial=0) < -DEEP, distance.argmin(axis=1)
+        places = self.strands.rest[strands, deepest][deep]
+        vertices = self.character.canonical(self.character.body.shaped(self._constant))
+        truly = np.ones(len(strands), bool)
+        truly[deep] = enclosed(places, vertices, self.character.body.triangles)
+        return truly
 
     def _push(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None, each: Callable) -> None:
         rest, clear = self._rest, self.clear

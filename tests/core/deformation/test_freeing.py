@@ -62,6 +62,19 @@ def test_hair_under_a_helmet_stays_there():
     assert not moved.any() and np.array_equal(laid.points, groom.points)
 
 
+@pytest.mark.parametrize("rim", [0.0, 0.03])
+def test_hair_below_the_rim_of_a_scalp_without_a_neck_stays_there(rim):
+    """The nearest face of an open cap has free air on its inner side, too: strands were flung by 15 and 24 cm."""
+    whole, taper = standing(1.0), np.linspace(1, 0.8, 24)[None, :, None]
+    cap = whole.body.only(BALL.faces[BALL.vertices[BALL.faces, 1].min(axis=1) > rim])
+    points, up = hanging(1.0, 24), rim + 0.02
+    points[:39] *= np.concatenate([taper, np.ones_like(taper), taper], axis=2)
+    points[:39] = points[:39] * [np.sqrt(1 - (up / RADIUS) ** 2), 1, np.sqrt(1 - (up / RADIUS) ** 2)] + [0, up, 0]
+    points = (points + whole.skeleton.bind[rigs.HEAD, :3, 3]).astype(np.float32)
+    moved = freed(Groom("Hair", points.reshape(-1, 3), np.full(40, 24)), Character(whole.skeleton, cap))[1]
+    assert moved.max() < 0.01
+
+
 def test_a_hat_is_no_obstacle():
     """Hair that goes in under its rim was crumpled between it and the skin."""
     bare, count = standing(1.0), len(BALL.vertices)
