@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist should know about a hair object, in the words of the panel."""
 
+from .renewed import NOTE
 from .scene import imported
 from .scene.muting import off_meanwhile
 from .session import session
@@ -17,6 +18,8 @@ def hair_notes(hair) -> list[str]:
         blown = own.armature is not None and own.armature.neuralocks_character.wind > 0
         if blown and not prepared.hair.model.feels_wind:
             found.append("The model is for held poses, so this hair feels no wind")
+    if hair.name_full in session.renewed and own.live and not own.model.strip():
+        found.append(NOTE)
     if off := off_meanwhile(hair):
         found.append(f"Off while Live, or the hair would move twice: {', '.join(off)}")
     if own.armature is not None and (doubt := imported.doubt(hair)):

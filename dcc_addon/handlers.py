@@ -6,7 +6,7 @@ from bpy.app.handlers import persistent
 
 from neuralocks_core.errors import NeuralocksError
 
-from . import background, live
+from . import background, live, renewed
 from .edited import touched
 from .live_strands import EDITING, known, live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
@@ -77,6 +77,7 @@ def on_load(*_):
     session.clear()
     if bpy.data.filepath:
         session.opened = {scene.name_full: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
+    renewed.compare()
     for scene in bpy.data.scenes:
         if live.needs_sampling(scene):
             background.request()
@@ -98,6 +99,7 @@ def before_save(target=None, *_):
     says since 4.0 where the file will be.
     """
     blur.end()
+    renewed.remember()
     for scene in bpy.data.scenes:
         live.show_rest(scene)
     show_all_rest()

@@ -119,6 +119,7 @@ class HairSettings(bpy.types.PropertyGroup):
         update=_look_changed,
         **SETTING,
     )
+    shipped: StringProperty(description="Checksum of the add-on's model that moved this hair when it was saved", **KEPT)
     muted: StringProperty(description="Modifiers that are off while the hair is live, as JSON", **KEPT)
     replaced: StringProperty(description="Modifiers that are off while the hair plays a cache, as JSON", **KEPT)
 

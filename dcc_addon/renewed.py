@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live hair that names no model moves by the one that comes with the add-on. An update may bring another one: then the hair of a
+file that was saved before says so.
+"""
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+import bpy
+
+from neuralocks_core import model as model_file
+
+from .session import session
+
+NOTE = (
+    "The model that comes with the add-on is another one than when this file was saved, so this hair moves differently"
+)
+
+
+def remember() -> None:
+    """Before a save: note which model moves the live hair."""
+    for hair in _shipped_hair():
+        if hair.library is None:
+            hair.neuralocks_hair.shipped = _checksum()
+    session.renewed.clear()
+
+
+def compare() -> None:
+    """After another file was opened: find live hair that another model moved. Files of add-ons that noted none count as such."""
+    if bpy.data.filepath:
+        session.renewed = {h.name_full for h in _shipped_hair() if h.neuralocks_hair.shipped != _checksum()}
+
+
+def _shipped_hair() -> list:
+    """Live hair that names no model."""
+    hairs = (thing for thing in bpy.data.objects if thing.type == "CURVES")
+    return [h for h in hairs if h.neuralocks_hair.live and not h.neuralocks_hair.model.strip()]
+
+
+@cache
+def _checksum() -> str:
+    return hashlib.sha256(Path(model_file.shipped("strands")).read_bytes()).hexdigest()[:16]
