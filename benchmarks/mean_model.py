@@ -2,20 +2,24 @@
 """The mean of a model and of one that started from it: often better than both, if a longer training with larger steps has
 left the valley of the first.
 
-    python benchmarks/mean_model.py MODEL BEGUN SHARE -o OUT
+    python benchmarks/mean_model.py MODEL BEGUN SHARE [--damping FACTOR] -o OUT
 
-SHARE is the share of BEGUN, from 0 to 1. Both share their strand codes, which stay. The card is that of BEGUN and says
-so, without the measurements of BEGUN.
+SHARE is the share of BEGUN, from 0 to 1. Both share their strand codes, which stay. With `--damping`, MODEL is first made to
+take so many times the damping for what it is told: a model that learned from a solver whose steps damp, before it is mixed
+with one that did not. The card is that of BEGUN and says so, without the measurements of BEGUN.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 from copy import deepcopy
 from pathlib import Path
 
 import plain_errors  # noqa: F401
 import torch
+
+from neuralocks_core.materials import RANGES
 
 
 def main() -> None:
@@ -24,12 +28,13 @@ def main() -> None:
     parser.add_argument("model", type=Path)
     parser.add_argument("begun", type=Path)
     parser.add_argument("share", type=float)
+    parser.add_argument("--damping", type=float, default=1.0)
     parser.add_argument("-o", "--out", type=Path, required=True)
     print(mean(**vars(parser.parse_args())))
 
 
-def mean(model: Path, begun: Path, share: float, out: Path) -> Path:
-    """Write the model whose weights are (1 - share) of `model`'s and `share` of `begun`'s."""
+def mean(model: Path, begun: Path, share: float, damping: float, out: Path) -> Path:
+    """Write the model whose weights are (1 - share) of `model`'s, at so many times its damping, and `share` of `begun`'s."""
     from neuralocks_core import model as model_file
     from neuralocks_core.boundary_spec import BoundarySpec
     from neuralocks_core.training.beginning import Beginning
@@ -44,9 +49,15 @@ def mean(model: Path, begun: Path, share: float, out: Path) -> Path:
     first = deepcopy(second)  # a deep map that the model lacks outputs zero, with the other's hidden layers
     Beginning(model).fill(first)
     with torch.no_grad():
+        # in normalised units, a constant that is added to the logarithm of damping is one that is added to each bias
+        place = spec.slices["material"].start + list(RANGES).index("damping")
+        shift = float(first.frame_scale[place]) * math.log(damping)
+        for layer in (first.frame, *list(first.encoder or ())[:1]):
+            layer.bias.add_(shift * layer.weight[:, place])
         for ours, theirs in zip(first.parameters(), second.parameters(), strict=True):
             ours.lerp_(theirs, share)
-    training = {**meta["training"], "mean": f"{share:g} of these weights, {1 - share:g} of those that it began with"}
+    began = "those that it began with" + (f", at {damping:g} times their damping" if damping != 1 else "")
+    training = {**meta["training"], "mean": f"{share:g} of these weights, {1 - share:g} of {began}"}
     graphs = strand_graphs(Beginning(begun).coder(), first, meta["output"])
     return model_file.write(out, {**meta, "training": training, "report": {}}, graphs)
 

@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulation of hair joint chains: rods of the energy in `training/rig/energy.py`, with inertia, many clips at once.
 
-Implicit Euler in the head's frame, Gauss-Newton on the joints' rotations. Per unit of mass a step minimises
+Second backward differences, as in `solver`, and Gauss-Newton on the joints' rotations. Per unit of mass a step minimises
 
-    sum m / (2 h^2) |x - y|^2 + sum m c / (2 h) |x - x_before|^2 + bend(D) - sum m (g + support) x + contact(x)
+    9 sum m / (8 h^2) |x - y|^2 + 3 sum m c / (4 h) |x - z|^2 + bend(D) - sum m (g + support) x + contact(x)
 
-with x the bones' far ends in the head's current frame, and y where free flight would have taken them. The contacts are
-points of the hair's mesh, each fixed to one joint, against the plane of the nearest body vertex.
+with x the bones' far ends in the head's current frame, y where free flight would have taken them, and z where they would be if
+they had the head's velocity. The contacts are points of the hair's mesh, each fixed to one joint, against the plane of the
+nearest body vertex.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts, NearestVertices
+from neuralocks_core.reference.head_motion import head_motion
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains
 from neuralocks_core.rig.rods import RodTree
@@ -74,7 +79,7 @@ class ChainSolver:
             heads: canonical space to world, (C, T, 4, 4).
             step: time between samples [s].
             body: the body to collide with.
-            wind: acceleration of the hair at each sample, in world axes, (T, 3) [m/s^2]; it is constant between samples.
+            wind: acceleration of the hair at each sample, in world axes, (T, 3) [m/s^2]; it is linear between samples.
             substeps: integration steps per sample.
             warm_up: steps at the first pose before the motion begins, so that it begins at rest.
         """
@@ -86,32 +91,32 @@ class ChainSolver:
         limit, near = self._limits(body), None
         pull = GRAVITY * self.weight + (np.zeros((samples, 3)) if wind is None else wind)
         result = np.empty((clips, samples, len(self.chains), 4), np.float32)
-        before = last = None
-        previous = heads[:, 0]
+        flown = None
+        ways = [head_motion(head, substeps) for head in heads]
+        facing = np.stack([Rotation.from_quat(way.turn).as_matrix() for way in ways])
+        places = np.stack([way.origin for way in ways])
         for sample in range(samples):
             inner = warm_up + 1 if sample == 0 else substeps
             for part in range(inner):
-                share = 1.0 if sample == 0 else (part + 1) / substeps
-                head = _between(previous, heads[:, sample], share)
-                rotation, origin = head[:, :3, :3], head[:, :3, 3]
+                at = 0 if sample == 0 else (sample - 1) * substeps + part + 1
+                now = at / substeps
+                rotation, origin = facing[:, at], places[:, at]
                 ends = bone_ends(self.chains, *pose_chains(self.chains, from_quaternion(turns)))
-                if last is None:
-                    last = before = np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None]
+                world = np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None]
                 if sample == 0:  # settles without momentum
-                    before = last
-                flight = np.einsum("cji,cmj->cmi", rotation, 2 * last - before - origin[:, None])
-                gravity = np.einsum("cji,j->ci", rotation, pull[sample])
-                if part == 0 and body is not None:
-                    near = NearestVertices(body.points[:, sample], body.normals[:, sample])
-                turns, ends = self._step(turns, ends, flight, gravity, h, near, limit)
-                before, last = last, np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None]
-            previous = heads[:, sample]
+                    flown = _Flown.at_rest(world, ends)
+                flight = np.einsum("cji,cmj->cmi", rotation, flown.free() - origin[:, None])
+                gravity = np.einsum("cji,j->ci", rotation, _between(pull, now))
+                if body is not None and (sample > 0 or part == 0):
+                    near = NearestVertices(_between(body.points, now, 1), _between(body.normals, now, 1))
+                turns, ends = self._step(turns, flight, flown.carried(), gravity, h, near, limit)
+                flown = flown.then(np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None], ends)
             result[:, sample] = turns
         return result
 
-    def _step(self, turns, start, flight, gravity, h, near, limit):
+    def _step(self, turns, flight, carried, gravity, h, near, limit):
         chains, tree = self.chains, self.tree
-        inertia, drag = 1 / h**2, self.damping / h
+        inertia, drag = 9 / (4 * h**2), 3 * self.damping / (2 * h)
         planes = None
         for _ in range(ITERATIONS):
             matrices = from_quaternion(turns)
@@ -119,7 +124,7 @@ class ChainSolver:
             ends = bone_ends(chains, rotations, positions)
             carriers = np.where((chains.parents < 0)[:, None, None], np.eye(3), rotations[:, chains.parents])
             force = (
-                -tree.mass[:, None] * (inertia * (ends - flight) + drag * (ends - start) - gravity[:, None])
+                -tree.mass[:, None] * (inertia * (ends - flight) + drag * (ends - carried) - gravity[:, None])
                 + tree.support
             )
             stiff = tree.mass * (inertia + drag)
@@ -176,14 +181,43 @@ class ChainSolver:
         return positions[:, owner] + np.einsum("cqij,qj->cqi", rotations[:, owner], arm)
 
 
-def _between(a, b, share):
-    """Rigid transforms (C, 4, 4) between a and b: positions linear, rotations nearest to the blend of the matrices."""
-    if share >= 1:
-        return b
-    result = (1 - share) * a + share * b
-    u, _, vt = np.linalg.svd(result[:, :3, :3])
-    result[:, :3, :3] = u @ vt
-    return result
+@dataclass(frozen=True)
+class _Flown:
+    """The last two states of the bones' ends (C, M, 3): in the world, in the head's frame, and their velocities [m per step].
+    Velocities and accelerations are second backward differences, as in `stepper`.
+    """
+
+    last: np.ndarray
+    before: np.ndarray
+    held: np.ndarray
+    held_before: np.ndarray
+    speed: np.ndarray
+    speed_before: np.ndarray
+
+    @classmethod
+    def at_rest(cls, world, held):
+        still = np.zeros_like(world)
+        return cls(world, world, held, held, still, still)
+
+    def free(self):
+        """Where the ends would be after a step without forces, in the world."""
+        return (12 * self.last - 3 * self.before + 2 * (4 * self.speed - self.speed_before)) / 9
+
+    def carried(self):
+        """Where they would be in the head's frame if their velocity was the head's."""
+        return (4 * self.held - self.held_before) / 3
+
+    def then(self, world, held):
+        """A step later."""
+        speed = (3 * world - 4 * self.last + self.before) / 2
+        return _Flown(world, self.last, held, self.held, speed, self.speed)
+
+
+def _between(values: np.ndarray, at: float, axis: int = 0) -> np.ndarray:
+    """Values at `at` samples, linear between two of them."""
+    first, share = int(at), at - int(at)
+    here = np.take(values, first, axis)
+    return here if share == 0 else (1 - share) * here + share * np.take(values, first + 1, axis)
 
 
 def _small(vector):

@@ -21,6 +21,8 @@ from neuralocks_core.reference.arguments import (
 from neuralocks_core.reference.head_motion import HeadMotion, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 
+INTEGRATOR = "BDF2"
+"""How the solver steps in time: what was simulated in another way has other motion."""
 SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 """[s] growing steps of a gradient flow that finds the equilibrium before the first frame."""
 
@@ -65,10 +67,12 @@ def simulate(
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> SimulatedHair:
-    """Simulate strands on a moving head and body by implicit Euler (docs/architecture.md, Physics).
+    """Simulate strands on a moving head and body, implicitly, by second backward differences (BDF2; Choi and Ko 2002, "Stable but
+    Responsive Cloth"; docs/architecture.md, Reference).
 
     Before the first frame the head moves at constant velocity without rotating and the hair is at rest relative to it. Any
-    motion is stable: lengths are exact by construction and every step lowers an energy.
+    motion is stable: lengths are exact by construction and every step lowers an energy. The time step's error is of second order,
+    so that it damps motion by next to nothing, unlike implicit Euler's.
 
     Args:
         rest: (S, K, 3) canonical rest points [m]; vertices 0 and 1 are clamped to the head.

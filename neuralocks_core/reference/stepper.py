@@ -94,6 +94,7 @@ class Stepper:
         wp = self.wp
         shape = (self.vertices, self.strands)
         self.x, self.last, self.before = (self._empty(wp.vec3d, shape) for _ in range(3))
+        self.moved, self.moved_before = (self._empty(wp.vec3d, shape) for _ in range(2))
         self.tension = self._empty(wp.float64, shape)
         self.load = energy_kernels.Load()
         self.load.target, self.load.pull = self._empty(wp.vec3d, shape), self._empty(wp.float64, shape)
@@ -139,7 +140,7 @@ class Stepper:
         self._pose(turn, origin)
         self.x.assign(np.ascontiguousarray(np.swapaxes(points @ self._matrix().T + origin, 0, 1)))
         self._add_drift()
-        self.carry, self.carry_origin = self.wp.quatd(0.0, 0.0, 0.0, 1.0), self.wp.vec3d(0.0, 0.0, 0.0)
+        self.carry = self.carry_before = self.wp.quatd(0.0, 0.0, 0.0, 1.0), self.wp.vec3d(0.0, 0.0, 0.0)
 
     def settle(self, dts: Sequence[float], iterations: int) -> None:
         """Follow a gradient flow, in steps of `dts` [s], to the equilibrium of the pose, or until nothing moves."""
@@ -156,6 +157,9 @@ class Stepper:
         """Give every vertex the velocity of a head that was at `before` one step ago."""
         shift = before - np.array(self.origin)
         self.before.assign(self.x.numpy() + shift)
+        for velocity in (self.moved, self.moved_before):
+            velocity.fill_(self.wp.vec3d(*(float(v) for v in -shift)))
+        self._pose_before = self.turn, self.wp.vec3d(*(float(v) for v in before))
         self._moving = False
 
     def step(self, turn: np.ndarray, origin: np.ndarray, dt: float, iterations: int) -> None:
@@ -163,10 +167,9 @@ class Stepper:
         Newton steps; the body has already been moved.
         """
         wp = self.wp
-        old_turn, old_origin = self.turn, self.origin
+        older, self._pose_before = self._pose_before, (self.turn, self.origin)
         self._pose(turn, origin)
-        self.carry = self.turn * wp.quat_inverse(old_turn)
-        self.carry_origin = self.origin - wp.quat_rotate(self.carry, old_origin)
+        self.carry, self.carry_before = self._carry(*self._pose_before), self._carry(*older)
         if self._moving:
             self.before, self.last, self.x = self.last, self.x, self.before
         else:
@@ -175,12 +178,14 @@ class Stepper:
         if self.mesh is not None:
             self._add_drift()
             # not at the predicted state, which may be past the body's far side
-            self._run(self.kernels.carry_along, (self.carry, self.carry_origin, self.last, self.x))
+            self._run(self.kernels.carry_along, (*self.carry, self.last, self.x))
             self._look(self.x, 1)
         args = (self.turn, self.origin, self.rest, self.constants.length, self.last, self.before, self.x)
         wp.launch(self.kernels.predict, dim=self.strands, inputs=list(args), device=self.device)
         self.used.zero_()
         self._solve(dt, iterations, settling=0)
+        self.moved, self.moved_before = self.moved_before, self.moved
+        self._run(self.kernels.keep_velocity, (self.x, self.last, self.before, self.moved))
 
     def read(self, points: np.ndarray, planes: np.ndarray | None) -> tuple[float, float]:
         """Write (S, K, 3) and, if wanted, (S, K, 4) canonical; return residual and Newton steps as in `solver.SimulatedHair`."""
@@ -213,8 +218,8 @@ class Stepper:
     def _gather(self, inverse_dt: float, settling: int) -> None:
         args = (
             self.constants.mass, self.rest, self.support, self.weight, self.damping, self.clumping, self.neighbours,
-            self.turn, self.gravity, self.wind, self.carry, self.carry_origin, inverse_dt, settling,
-            self.x, self.last, self.before, self.load.target, self.load.pull,
+            self.turn, self.gravity, self.wind, *self.carry, *self.carry_before, inverse_dt, settling,
+            self.x, self.last, self.before, self.moved, self.moved_before, self.load.target, self.load.pull,
         )  # fmt: skip
         self._run(self.kernels.forces, args)
         if self.volume is not None:
@@ -240,6 +245,11 @@ class Stepper:
             now = (self._body_now - np.array(self.origin)) @ self._matrix()
             self.drift += float(np.sqrt(np.square(now - self._body_in_head).sum(1).max()))
             self._body_in_head = now
+
+    def _carry(self, turn: object, origin: object) -> tuple:
+        """Rotation and origin of the motion that takes a point fixed to the head from a pose to the present one."""
+        change = self.turn * self.wp.quat_inverse(turn)
+        return change, self.origin - self.wp.quat_rotate(change, origin)
 
     def _matrix(self) -> np.ndarray:
         return np.array(self.wp.quat_to_matrix(self.turn), np.float64).reshape(3, 3)

@@ -124,7 +124,8 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
     file, now = work / INPUTS, _inputs(scene)
     if resume and file.exists():
         try:
-            before = json.loads(file.read_text("utf-8"))
+            # simulations of inputs that name no integrator are by implicit Euler
+            before = {"integrator": "implicit Euler"} | json.loads(file.read_text("utf-8"))
             changed = [name for name in now if before[name] != now[name]]
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise NeuralocksError(f"{file}: cannot be read; train without --resume") from None
@@ -140,6 +141,8 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
 
 
 def _inputs(scene: TrainingScene) -> dict:
+    from neuralocks_core.reference.solver import INTEGRATOR
+
     character, clips = scene.character, scene.clips
     body, skeleton = character.body, character.skeleton
     own = (
@@ -161,6 +164,7 @@ def _inputs(scene: TrainingScene) -> dict:
         "groom": _digest([groom.rest for groom in scene.grooms]),
         "motion": _digest([array for clip in clips for array in (clip.times, clip.joints, clip.shape)]),
         "history": scene.spec.to_json(),
+        "integrator": INTEGRATOR,
     }
     return json.loads(json.dumps(facts))  # tuples become lists, as in the file
 

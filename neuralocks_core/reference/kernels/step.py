@@ -61,17 +61,23 @@ def forces(
     wind: wp.vec3d,
     carry: wp.quatd,
     carry_origin: wp.vec3d,
+    carry_before: wp.quatd,
+    carry_before_origin: wp.vec3d,
     inverse_dt: wp.float64,
     settling: int,
     x: array_vec,
     last: array_vec,
     before: array_vec,
+    moved: array_vec,
+    moved_before: array_vec,
     target: array_vec,
     pull: array_real,
 ):
     """All quadratic terms in one spring per vertex: pull/2 |x - target|^2.
 
-    carry takes a point fixed to the head from the last pose to this one: velocity is damped towards it. Neighbours are
+    Velocity and acceleration are the second backward differences of Choi and Ko (2002), over the last two positions, `last` and
+    `before`, and the last two velocities, `moved` and `moved_before` [m per step]. carry and carry_before take a point fixed to
+    the head from the last pose and from the one before it to this one: velocity is damped towards the head's. Neighbours are
     read in their current state (Jacobi). While settling there is neither velocity nor damping.
     """
     k, s = wp.tid()
@@ -81,10 +87,18 @@ def forces(
         stiff = inverse_dt * inverse_dt
         sum = stiff * old
         if settling == 0:
-            drag = damping[s] * inverse_dt
-            # (2 last - before), and the head's own motion, both from the last position
-            sum = stiff * (old + (old - before[k, s])) + drag * (wp.quat_rotate(carry, old) + carry_origin)
-            stiff = stiff + drag
+            three = wp.float64(3.0)
+            four = wp.float64(4.0)
+            half = wp.float64(0.5)
+            older = before[k, s]
+            # velocity is (3 x - flight) / 2 per step, and acceleration the same of velocities
+            flight = four * old - older
+            sum = half * stiff * (half * three * flight + four * moved[k, s] - moved_before[k, s])
+            stiff = half * half * three * three * stiff
+            drag = half * damping[s] * inverse_dt
+            here = wp.quat_rotate(carry, old) + carry_origin
+            sum = sum + drag * (four * here - wp.quat_rotate(carry_before, older) - carry_before_origin)
+            stiff = stiff + three * drag
         sum = sum + weight[s] * gravity + wind
         count = wp.float64(0.0)
         meet = wp.vec3d()
@@ -100,6 +114,13 @@ def forces(
         force = m * sum + weight[s] * wp.quat_rotate(turn, support[k, s])
         pull[k, s] = m * stiff
         target[k, s] = force / (m * stiff)
+
+
+@wp.kernel(enable_backward=False)
+def keep_velocity(x: array_vec, last: array_vec, before: array_vec, moved: array_vec):
+    """Velocity at the end of a step [m per step]: the second backward difference."""
+    k, s = wp.tid()
+    moved[k, s] = wp.float64(1.5) * (x[k, s] - last[k, s]) - wp.float64(0.5) * (last[k, s] - before[k, s])
 
 
 @wp.kernel(enable_backward=False)

@@ -58,6 +58,39 @@ def test_a_chain_without_support_droops_to_the_least_energy():
     assert wanted.sum() > 0.4
 
 
+def test_error_falls_with_the_square_of_the_step():
+    """Distances between successive halvings shrink by four on a head that moves as hair can follow."""
+    chains = chain((0, -BONE, 0.3 * BONE))
+    solver = ChainSolver(chains, RodTree(chains, RigMaterial(bend=1e-2)), 6.0)
+
+    def turns(rate):
+        size = np.sin(np.pi * np.arange(rate + 1) / rate) ** 4
+        heads = np.tile(np.eye(4), (1, rate + 1, 1, 1))
+        heads[0, :, :3, :3] = Rotation.from_rotvec(np.outer(size, [0.1, 0.5, 0.2])).as_matrix()
+        heads[0, :, 2, 3] = 0.1 * size
+        return solver.simulate(heads, 1 / rate, substeps=1)[0, :: rate // 30].astype(float)
+
+    every = [turns(rate) for rate in (60, 120, 240)]
+    coarse, fine = (np.abs(a - b).max() for a, b in zip(every, every[1:], strict=False))
+    assert coarse / fine == pytest.approx(4.0, abs=0.8)
+
+
+def test_only_damping_slows_a_chain():
+    """A pendulum of one bone loses exp(-c t / 2) of its swing and next to nothing by steps of 1/60 s."""
+    chains, damping = chain((0, -0.3, 0), 1), 2.0
+    heads = np.tile(np.eye(4), (1, 91, 1, 1))
+    heads[0, 1:, 0, 3] = 0.01
+    sizes = []
+    for c in (0.0, damping):
+        turns = ChainSolver(chains, RodTree(chains, RigMaterial(bend=1e-9)), c).simulate(heads, 1 / 30, warm_up=2)
+        angle = np.abs(2 * np.arcsin(turns[0, :, 0, 3].astype(float)))
+        sizes.append([angle[2:32].max(), angle[61:].max()])
+    bare, damped = np.array(sizes)
+    assert bare[1] / bare[0] > 0.97
+    peaks = 59 / 30  # s between the two windows' peaks, within a swing
+    assert np.log(damped[0] / damped[1]) == pytest.approx(damping / 2 * peaks, rel=0.15)
+
+
 def test_spring_bones_follow_those_above_them_in_the_same_frame():
     """The procedure of VRMC_springBone 1.0 on nodes with arbitrary bind axes, from the root to the descendants."""
     chains, step, settings = chain((0.01, -0.05, -0.02), 4), 1 / 60, SpringSettings(1.3, 0.25, 0.4)

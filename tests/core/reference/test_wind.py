@@ -26,9 +26,13 @@ def still(frames):
 
 
 def accelerated(frames, wind):
-    """Heads (T, 4, 4) whose second difference over a step is that of -wind (T, 3)."""
+    """Heads (T, 4, 4) at rest until `wind` (T, 3) begins, whose acceleration by the solver's differences is -wind."""
     heads = still(frames)
-    heads[:, :3, 3] = np.cumsum(np.cumsum(-wind * DT**2, axis=0), axis=0)
+    place, velocity = np.zeros((frames + 2, 3)), np.zeros((frames + 2, 3))  # two frames of rest before the first
+    for i in range(2, frames + 2):
+        velocity[i] = (-2 * DT * wind[i - 2] + 4 * velocity[i - 1] - velocity[i - 2]) / 3
+        place[i] = (2 * DT * velocity[i] + 4 * place[i - 1] - place[i - 2]) / 3
+    heads[:, :3, 3] = place[2:]
     return heads
 
 

@@ -60,6 +60,14 @@ def test_notes_that_are_none_are_one_line(tmp_path, monkeypatch, forged):
         work.keep_inputs(SimpleNamespace(), tmp_path, resume=True)
 
 
+def test_simulations_of_another_solver_are_not_gone_on_with(tmp_path, monkeypatch):
+    """Those of a release whose solver damped motion by its steps name no integrator."""
+    monkeypatch.setattr(work, "_inputs", lambda scene: {"seed": 0, "integrator": "BDF2"})
+    (tmp_path / work.INPUTS).write_text('{"seed": 0}')
+    with pytest.raises(NeuralocksError, match="began with a different integrator; .*train without --resume"):
+        work.keep_inputs(SimpleNamespace(), tmp_path, resume=True)
+
+
 @pytest.mark.parametrize("learned_with", (work.CODES, work.BEGINNING))
 def test_a_network_does_not_go_on_without_what_it_learned_with(tmp_path, learned_with):
     """New codes of the strands would mean something else to it, and the model would be silently wrong."""

@@ -95,7 +95,7 @@ def test_a_simulation_is_compared_with_the_solver_as_it_was(tmp_path):
     for volume in (0.0, 3.0):
         simulate(shot, tmp_path / "hair.usdc", volume=volume)
         rows = evaluate(tmp_path / "hair.usdc", reference=True).compared["/Hero/Hair"]
-        assert rows["bake"]["position_percent"] < 0.05, volume
+        assert rows["bake"]["motion_error_median"] < 0.004 and rows["bake"]["position_percent"] < 0.1, volume
 
 
 def coiled(path, strands=12, vertices=150):
@@ -119,9 +119,9 @@ def test_of_coils_the_motion_of_their_lines_is_measured(tmp_path):
     simulate(shot, tmp_path / "hair.usdc")
     card = evaluate(tmp_path / "hair.usdc", reference=True)
     values, bake_row = card.grooms["/Hero/Hair"], card.compared["/Hero/Hair"]["bake"]
-    assert values["turn_degrees"] == pytest.approx(values["turn_at_rest_degrees"], abs=0.5)
+    assert values["turn_degrees"] == pytest.approx(values["turn_at_rest_degrees"], rel=0.2)
     assert values["energy_bend"] < 0.02
-    assert bake_row["motion_error_median"] < 0.03 and bake_row["position_percent"] < 0.2
+    assert bake_row["motion_error_median"] < 0.03 and bake_row["position_percent"] < 0.3
 
 
 def test_of_a_groom_without_hair_nothing_is_claimed(tmp_path, model):
