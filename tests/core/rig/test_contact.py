@@ -63,7 +63,7 @@ def test_ribbons_that_fall_over_the_head_lie_on_it():
         turns = solver.simulate(heads, 1 / 30, met)[0].astype(float)
         points = skin(rig.chains, *pose_chains(rig.chains, from_quaternion(turns)), rig.points, rig.weights)
         depths.append(RADIUS - np.linalg.norm(points - CENTRE, axis=-1).min())
-    assert depths[0] > 0.02 and depths[1] < -0.004, depths
+    assert depths[0] > 0.02 and depths[1] < -0.0035, depths
 
 
 def test_contacts_are_the_corners_of_each_joint():
