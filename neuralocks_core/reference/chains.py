@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts, NearestVertices
-from neuralocks_core.reference.head_motion import head_motion
+from neuralocks_core.reference.head_motion import between, head_motion
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains
 from neuralocks_core.rig.rods import RodTree
@@ -91,6 +91,8 @@ class ChainSolver:
         limit, near = self._limits(body), None
         pull = GRAVITY * self.weight + (np.zeros((samples, 3)) if wind is None else wind)
         result = np.empty((clips, samples, len(self.chains), 4), np.float32)
+        # by sample, then by clip
+        bodies = () if body is None else [np.swapaxes(a, 0, 1) for a in (body.points, body.normals)]
         flown = None
         ways = [head_motion(head, substeps) for head in heads]
         facing = np.stack([Rotation.from_quat(way.turn).as_matrix() for way in ways])
@@ -99,16 +101,15 @@ class ChainSolver:
             inner = warm_up + 1 if sample == 0 else substeps
             for part in range(inner):
                 at = 0 if sample == 0 else (sample - 1) * substeps + part + 1
-                now = at / substeps
                 rotation, origin = facing[:, at], places[:, at]
                 ends = bone_ends(self.chains, *pose_chains(self.chains, from_quaternion(turns)))
                 world = np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None]
                 if sample == 0:  # settles without momentum
                     flown = _Flown.at_rest(world, ends)
                 flight = np.einsum("cji,cmj->cmi", rotation, flown.free() - origin[:, None])
-                gravity = np.einsum("cji,j->ci", rotation, _between(pull, now))
+                gravity = np.einsum("cji,j->ci", rotation, between(pull, at, substeps))
                 if body is not None and (sample > 0 or part == 0):
-                    near = NearestVertices(_between(body.points, now, 1), _between(body.normals, now, 1))
+                    near = NearestVertices(*(between(a, at, substeps) for a in bodies))
                 turns, ends = self._step(turns, flight, flown.carried(), gravity, h, near, limit)
                 flown = flown.then(np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None], ends)
             result[:, sample] = turns
@@ -211,13 +212,6 @@ class _Flown:
         """A step later."""
         speed = (3 * world - 4 * self.last + self.before) / 2
         return _Flown(world, self.last, held, self.held, speed, self.speed)
-
-
-def _between(values: np.ndarray, at: float, axis: int = 0) -> np.ndarray:
-    """Values at `at` samples, linear between two of them."""
-    first, share = int(at), at - int(at)
-    here = np.take(values, first, axis)
-    return here if share == 0 else (1 - share) * here + share * np.take(values, first + 1, axis)
 
 
 def _small(vector):

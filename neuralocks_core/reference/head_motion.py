@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The head's rigid motion between frames."""
+"""Motion between frames: the head's, which is rigid and smooth, and linear for all else."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,3 +49,12 @@ def head_motion(head: np.ndarray, substeps: int) -> HeadMotion:
     at = np.arange((frames - 1) * substeps + 1) / substeps
     knots = np.arange(frames)
     return HeadMotion(RotationSpline(knots, turns)(at).as_quat(), PchipInterpolator(knots, origin)(at))
+
+
+def between(values: Sequence[np.ndarray] | np.ndarray, step: int, substeps: int) -> np.ndarray:
+    """Body points or wind at a substep: of T `values`, each one frame's, those of the frames before and after it, linear."""
+    frame, part = divmod(step, substeps)
+    if part == 0:
+        return np.asarray(values[frame])
+    blend = part / substeps
+    return (1 - blend) * np.asarray(values[frame]) + blend * np.asarray(values[frame + 1])

@@ -18,7 +18,7 @@ from neuralocks_core.reference.arguments import (
     check_settings,
     check_wind,
 )
-from neuralocks_core.reference.head_motion import HeadMotion, head_motion
+from neuralocks_core.reference.head_motion import HeadMotion, between, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 
 INTEGRATOR = "BDF2"
@@ -146,8 +146,8 @@ def simulate(
         steps = [] if frame == 0 else range((frame - 1) * substeps + 1, frame * substeps + 1)
         for step in steps:
             if body is not None:
-                stepper.move_body(_between(body, step, substeps) - away)
-            stepper.blow(_between(wind, step, substeps))
+                stepper.move_body(between(body, step, substeps) - away)
+            stepper.blow(between(wind, step, substeps))
             stepper.step(way.turn[step], way.origin[step], dt / substeps, iterations)
         left = stepper.read(result.points[frame], result.planes[frame] if planes else None)
         result.residual[frame], result.iterations[frame] = left
@@ -170,12 +170,3 @@ def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, i
         stepper.settle(SETTLE_DT, iterations)
     before = way.origin[0] - (way.origin[1] - way.origin[0]) if len(way.origin) > 1 else way.origin[0]
     stepper.start_moving(before)
-
-
-def _between(values: Any, step: int, substeps: int) -> np.ndarray:
-    """Body points or wind at a substep: linear between frames."""
-    frame, part = divmod(step, substeps)
-    if part == 0:
-        return np.asarray(values[frame])
-    blend = part / substeps
-    return (1 - blend) * np.asarray(values[frame]) + blend * np.asarray(values[frame + 1])
