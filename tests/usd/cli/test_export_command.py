@@ -19,7 +19,7 @@ def test_plain_onnx_with_its_description(tmp_path, model, capsys):
     text = (tmp_path / "description.json").read_text()
     description = json.loads(text)
     assert len(told) == 5 and {Path(line).name for line in told} >= {"description.json", *description["graphs"]}
-    assert len(text) < 25_000 and "curve" not in description["model"]["training"]
+    assert len(text) < 22_000 and "curve" not in description["model"]["training"]
     for name, graph in description["graphs"].items():
         assert (tmp_path / name).read_bytes() == model_file.read(model_file.shipped()).graphs[name]
         session = onnxruntime.InferenceSession(tmp_path / name, providers=["CPUExecutionProvider"])
