@@ -64,7 +64,7 @@ def test_hair_under_a_helmet_stays_there():
 
 @pytest.mark.parametrize("rim", [0.0, 0.03])
 def test_hair_below_the_rim_of_a_scalp_without_a_neck_stays_there(rim):
-    """The nearest face of an open cap has free air on its inner side, too: strands were flung by 15 and 24 cm."""
+    """The nearest face of an open cap has free air on its inner side, too: strands were flung by 3 and 24 cm."""
     whole, taper = standing(1.0), np.linspace(1, 0.8, 24)[None, :, None]
     cap = whole.body.only(BALL.faces[BALL.vertices[BALL.faces, 1].min(axis=1) > rim])
     points, up = hanging(1.0, 24), rim + 0.02
