@@ -36,8 +36,9 @@ class Runtime:
         self.fixed = dict(np.load(folder / name))
         self.frame, self.tail = (onnxruntime.InferenceSession(folder / f"{n}.onnx") for n in ("frame", "tail"))
         material = DEFAULT | material
-        ratios = [np.log(material[name] / DEFAULT[name]) for name in ("bend", "weight", "damping")]
-        self.fixed["held"][slice(*self.parts["material"])] = [*ratios, 0]
+        bend, weight, damping, clumping = (material[name] / DEFAULT[name] for name in DEFAULT)
+        self.pace = np.sqrt(weight)
+        self.fixed["held"][slice(*self.parts["material"])] = [np.log(bend / weight), 0, np.log(damping / self.pace), 0]
         for locks in ("", "lock_"):
             self.fixed[f"{locks}anchor"][:] = 0
             if self.model.get("anchored"):
@@ -45,14 +46,14 @@ class Runtime:
         length = np.maximum(self.fixed["length"], 1e-3)
         own = 12.36 * material["bend"] / length**4 + 9.81 * material["weight"] / length
         tie = self.fixed["tie"]
-        self.stray = ((own + 120 * tie) / (own + 2 * material["clumping"] * tie))[:, None, None]
+        self.stray = ((own + 120 * tie) / (own + 120 * clumping * tie))[:, None, None]
 
     def turns(self, rotations: np.ndarray) -> np.ndarray:
         """(T, n, 3, 3) world rotations of the named joints, from the bind pose."""
         return rotations @ np.swapaxes(self.fixed["bind"], -1, -2) @ self.fixed["facing"].T
 
     def vector(self, places: np.ndarray, turns: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-        """The boundary vector (F,) of the newest of some moments, each the model's dt before the one before it.
+        """The boundary vector (F,) of the newest of some moments, each the model's dt / `pace` before the one before it.
 
         Args:
             places: (steps + 2, 3) positions of the head joint, newest first [m].
@@ -214,7 +215,8 @@ def differences(folder: Path, shot: Path, baked: Path, material: dict[str, float
         boundary = runtime.model["boundary"]
         for code in curves.GetPointsAttr().GetTimeSamples():
             now = code / stage.GetTimeCodesPerSecond()
-            places, rotations = motion.at(now - boundary["dt"] * np.arange(sum(boundary["bins"]) + 2))
+            step = boundary["dt"] / runtime.pace
+            places, rotations = motion.at(now - step * np.arange(sum(boundary["bins"]) + 2))
             drawn = motion.drawn(code)
             ours = runtime.strands(runtime.vector(places, *map(runtime.turns, (rotations, turned(drawn)))), drawn[0])
             to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(curves.GetPrim()))

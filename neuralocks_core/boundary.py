@@ -14,6 +14,7 @@ from neuralocks_core.blows import softened
 from neuralocks_core.boundary_spec import MATERIALS, POSE_JOINTS, BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import UNREAD, at_weight_one
 from neuralocks_core.measures import measures_read
 from neuralocks_core.motion import GRAVITY, Clip, G
 from neuralocks_core.stepped import Stepped
@@ -75,7 +76,8 @@ class BoundarySampler:
 
         Args:
             times: (n,) [s].
-            material: log-ratios to the reference material, (4,) or (n, 4).
+            material: log-ratios to the reference material, (4,) or (n, 4). Vectors are for hair of weight 1 (`at_weight_one`),
+                with the motion at its speed; they hold `UNREAD` constants as given.
             strength: motion strength; scales the history and is exact at 0 (the held pose).
             joints: the world joint transforms (n, J, 4, 4) that are drawn at these times, if they are known
                 better than from the clip.
@@ -97,7 +99,8 @@ class BoundarySampler:
             raise NeuralocksError(f"joints: are of shape {np.shape(joints)}; give {(len(times), count, 4, 4)}")
         if not len(times):
             return np.zeros((0, spec.size), np.float32)
-        lags = spec.dt * np.arange(spec.steps + 2)
+        ratios, pace = _read(material, len(times))
+        lags = spec.dt * np.arange(spec.steps + 2) / pace[:, None]
         position, turns, shown = self._sample(times, lags)
         now = turns[:, 0] if joints is None else self.character.relative_rotations(joints, self.joints)
         result = np.zeros((len(times), spec.size), np.float32)
@@ -108,11 +111,11 @@ class BoundarySampler:
         static = np.einsum("nji,j->ni", head, GRAVITY / G)
         result[:, parts["gravity"]] = static
         result[:, parts["shape"]] = [self._measures(shape) for shape in self.clip.shape_at(times)]
-        result[:, parts["material"]] = _log_ratios(material, len(times))
+        result[:, parts["material"]] = ratios
         if spec.bins:
             result[:, parts["history"]] = strength * self._history(position, turns, static)
         if wind is not None:
-            result[:, parts["history"]] += self._blown(wind, turns, shown[:, None] - lags)
+            result[:, parts["history"]] += self._blown(wind, turns, shown[:, None] - lags) / pace[:, None] ** 2
         return result
 
     def held_bind(self, material=(0.0,) * MATERIALS, shape: np.ndarray | None = None) -> np.ndarray:
@@ -122,7 +125,7 @@ class BoundarySampler:
         result[parts["pose"]] = self.stance[..., :2].swapaxes(-1, -2).ravel()
         result[parts["gravity"]] = GRAVITY / G
         result[parts["shape"]] = self._measures(self.clip.shape[0] if shape is None else shape)
-        result[parts["material"]] = _log_ratios(material)
+        result[parts["material"]] = _read(material)[0]
         return result
 
     def _measures(self, shape: np.ndarray) -> np.ndarray:
@@ -134,19 +137,19 @@ class BoundarySampler:
         return self._shape_cache[key]
 
     def _sample(self, times: np.ndarray, lags: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Head positions (n, L, 3) and rotations (n, L, joints, 3, 3) at times (n,) minus lags (L,), as if there had been nothing
+        """Head positions (n, L, 3) and rotations (n, L, joints, 3, 3) at times (n,) minus lags (n, L), as if there had been nothing
         before the last cut; and the times (n,) whose motion is shown, which differ in animation on twos.
         """
-        position = np.empty((len(times), len(lags), 3))
-        turns = np.empty((len(times), len(lags), len(self.joints), 3, 3))
+        position = np.empty((*lags.shape, 3))
+        turns = np.empty((*lags.shape, len(self.joints), 3, 3))
         shown = np.empty(len(times))
         part = np.searchsorted(self._cuts - 1e-9, times, side="right")
         for one in np.unique(part):
             rows = part == one
             shown[rows] = self._stepped[one].times(times[rows])
-            places, rotations = self._tracks[one].at((shown[rows, None] - lags).ravel())
-            position[rows] = places.reshape(-1, len(lags), 3)
-            turns[rows] = rotations.reshape(-1, len(lags), len(self.joints), 3, 3)
+            places, rotations = self._tracks[one].at((shown[rows, None] - lags[rows]).ravel())
+            position[rows] = places.reshape(-1, *position.shape[1:])
+            turns[rows] = rotations.reshape(-1, *turns.shape[1:])
         return position, turns, shown
 
     def _history(self, position, turns, static) -> np.ndarray:
@@ -197,12 +200,15 @@ def _stance(character: Character, name: str) -> np.ndarray:
     return rotation.between([1.0 if side == "left" else -1.0, 0.0, 0.0], bone)
 
 
-def _log_ratios(material, *count: int) -> np.ndarray:
-    """The material (4,), or `count` of them (n, 4), checked."""
+def _read(material, *count: int) -> tuple[np.ndarray, np.ndarray]:
+    """What vectors hold of a material, (4,) or (n, 4) for a `count`, and the motion's speed in them, () or (n,)."""
     material = np.asarray(material, float)
     if material.shape not in ((MATERIALS,), (*count, MATERIALS)) or not np.isfinite(material).all():
         raise NeuralocksError(f"material {material}: give {MATERIALS} log-ratios, as Material.log_ratios does")
-    return material
+    given = np.broadcast_to(material, (*count, MATERIALS))
+    ratios, pace = at_weight_one(given)
+    ratios[..., UNREAD] = given[..., UNREAD]
+    return ratios, pace
 
 
 def _limited(vectors: np.ndarray, limit: float) -> np.ndarray:

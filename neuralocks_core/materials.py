@@ -35,6 +35,9 @@ LINEAR = 0.02
 SMOOTHING = 0.015
 """h of the density that detects crowded hair [m]: each vertex is spread over 2 h."""
 
+UNREAD = [list(RANGES).index(name) for name in ("weight", "clumping")]
+"""Which constants a boundary vector holds for the law of clumping alone: networks are given zeros for them."""
+
 _SOFT = 20.0  # clumping may be 0, which has no logarithm: this offset is added first
 
 
@@ -112,6 +115,25 @@ class Material:
                 raise NeuralocksError(f"material '{setting}': {name} is given twice; give it once")
             given[name] = value
         return cls(**given)
+
+
+def at_weight_one(log_ratios: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The hair of weight 1 that moves like this one at another speed, and how many times as fast this one is.
+
+    Divided by the weight w, a rod's equation of motion is that of bending stiffness B / w, damping c / sqrt(w) and clumping k / w,
+    with time in units of 1 / sqrt(w): dynamic similarity, after Froude. So a network that knows hair of weight 1 knows every
+    weight, if it reads the motion at that speed.
+
+    Args:
+        log_ratios: (..., 4), see `Material.log_ratios`.
+
+    Returns:
+        The other hair's log-ratios (..., 4) float64, and sqrt(w) (...,).
+    """
+    bend, weight, damping, clumping = np.moveaxis(np.asarray(log_ratios, np.float64), -1, 0)
+    tie = np.maximum((Material.clumping + _SOFT) * np.exp(clumping) - _SOFT, 0) / np.exp(weight)
+    tie = np.log((tie + _SOFT) / (Material.clumping + _SOFT))
+    return np.stack([bend - weight, np.zeros_like(weight), damping - weight / 2, tie], axis=-1), np.exp(weight / 2)
 
 
 def _check(name: str, value, said: str) -> None:

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neuralocks_core.materials import RANGES, Material, constants
+from neuralocks_core.materials import Material, constants
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.network_sizes import SHAPE, K
 from neuralocks_core.strands.locks import lock_mates, lock_means, tied_together
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, root_frames
 
-COLUMN = list(RANGES).index("clumping")
-"""Index of clumping in a vector's material."""
 CANTILEVER = 12.36
 """Fourth power of 1.8751, the first root of a clamped rod's cos cosh = -1."""
 
@@ -75,13 +73,13 @@ class Locks:
         the solver.
 
         Args:
-            log_ratios: of the material (4,), see `Material.log_ratios`.
+            log_ratios: of the material (4,), as a boundary vector holds it.
 
         Returns:
             (S,) float32.
         """
         bend, weight, _, clumping = constants(log_ratios)
-        own = bend * self.rod + weight * self.pendulum
+        own = weight * (bend * self.rod + self.pendulum)  # the vector's bend is B / w
         return ((own + 2 * self.tie * Material().clumping) / (own + 2 * self.tie * clumping)).astype(np.float32)
 
     def gather(self, displacement: np.ndarray, hairs: slice, led: np.ndarray, factor: np.ndarray) -> None:

@@ -9,12 +9,15 @@ from threading import Lock
 
 import numpy as np
 
-from neuralocks_core.deformation.clumping import COLUMN, Locks
+from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import RANGES, UNREAD
 from neuralocks_core.network_sizes import HIDDEN, SHAPE, K
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.locks import lock_codes
 from neuralocks_core.strands.strand_set import StrandSet, scalp_local
+
+CLUMPING = list(RANGES).index("clumping")
 
 
 class StrandSession:
@@ -43,7 +46,7 @@ class StrandSession:
 
         Costs one inference, or nothing if this vector is already in use.
         """
-        vector, _ = self._without_clumping(vector)
+        vector = self._read(vector)
         if not self.model.anchored or (self._anchored_at is not None and np.array_equal(vector, self._anchored_at)):
             return
         self.anchor_offsets[:] = self._tail("offsets", self.model.frame(vector))
@@ -66,24 +69,24 @@ class StrandSession:
 
     def _frame(self, vector: np.ndarray):
         """What all strands share in a frame: the tail's inputs, and how to change a chunk's displacement afterwards."""
-        plain, clumping = self._without_clumping(vector)
-        frame = self.model.frame(plain)
-        if not clumping:  # exactly 0 for the default
+        frame = self.model.frame(self._read(vector))
+        material = vector[self.model.spec.slices["material"]]
+        if not material[CLUMPING]:  # exactly 0 for the default
             return frame, None
         locks, session = self._locks
         if self._anchored_at is not None:
             session.anchor(self._anchored_at)
         led = session._tail("displacement", frame).reshape(-1, K, 3)
-        factor = locks.spread(vector[self.model.spec.slices["material"]])
+        factor = locks.spread(material)
         return frame, partial(locks.gather, led=led, factor=factor)
 
-    def _without_clumping(self, vector: np.ndarray) -> tuple[np.ndarray, float]:
-        """The vector for average clumping, and the logarithm of the clumping's ratio to that."""
-        plain, column = np.array(vector, np.float32), self.model.spec.slices["material"].start + COLUMN
-        if plain.shape != (self.model.spec.size,):
-            raise NeuralocksError(f"vector: is of shape {plain.shape}; this model reads ({self.model.spec.size},)")
-        clumping, plain[column] = float(plain[column]), 0.0
-        return plain, clumping
+    def _read(self, vector: np.ndarray) -> np.ndarray:
+        """What the network is given of a vector."""
+        read = np.array(vector, np.float32)
+        if read.shape != (self.model.spec.size,):
+            raise NeuralocksError(f"vector: is of shape {read.shape}; this model reads ({self.model.spec.size},)")
+        read[self.model.spec.slices["material"]][UNREAD] = 0
+        return read
 
     @cached_property
     def _locks(self) -> tuple[Locks, StrandSession]:

@@ -133,7 +133,8 @@ def _stiffness(materials, hair: list[Hair], options: SelfSupervisedOptions, dyna
 
 
 def _material(options: SelfSupervisedOptions, rng: np.random.Generator) -> Material:
-    return Material.random(rng) if options.random_materials else Material()
+    """Of weight 1, which tells the network about the others (`at_weight_one`)."""
+    return replace(Material.random(rng), weight=1.0) if options.random_materials else Material()
 
 
 def _carried(transform: Tensor, points: Tensor) -> Tensor:

@@ -7,7 +7,7 @@ the tree would take longer than the step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -102,6 +102,7 @@ class MomentPool:
 
     def _add(self, index: int) -> None:
         maker, draw, dt = self._maker, self._maker.draw(index), self.scene.spec.dt
+        draw = replace(draw, materials=tuple(replace(material, weight=1.0) for material in draw.materials))
         character, groom = self.scene.character, self.scene.grooms[draw.groom]
         vectors, bind = maker.vectors(draw, self.scene.spec)
         rest = maker.fitted(groom.rest[draw.strands].astype(np.float64), draw.shape)

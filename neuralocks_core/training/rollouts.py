@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
-from neuralocks_core.materials import RANGES, Material
+from neuralocks_core.materials import RANGES, Material, at_weight_one
 from neuralocks_core.measures import body_measures
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands.locks import lock_mates
@@ -73,8 +73,8 @@ class Rollout:
         step: this unit [m].
         planes: nearest body plane of each vertex, (T, n, 24, 4) float16: normal, and offset from the rest vertex.
         residual: of the solver, rms relative to weight.
-        materials: log-ratios of each strand's material (n, 4) float32, the same within a lock; `vectors` and `bind`
-            have the first strand's.
+        materials: log-ratios of each strand's material (n, 4) float32 as the network reads them (`at_weight_one`), the same
+            within a lock; `vectors` and `bind` have the first strand's.
     """
 
     groom: int
@@ -97,7 +97,8 @@ class Draw:
     Attributes:
         groom: index into the scene's grooms.
         strands: (n,) indices of its strands.
-        materials: of each strand, the same within a lock: one motion covers many materials at the cost of one.
+        materials: of each strand, the same within a lock: one motion covers many materials at the cost of one. All have one
+            weight, which says at what speed the motion is read.
         shape: blend shape weights.
         clip: the motion.
         times: (T,) [s].
@@ -162,7 +163,7 @@ class RolloutMaker:
             step=step,
             planes=np.clip(planes, -1000, 1000).astype(np.float16),
             residual=float(np.median(result.residual)),
-            materials=np.stack([m.log_ratios() for m in draw.materials]),
+            materials=at_weight_one([m.log_ratios() for m in draw.materials])[0].astype(np.float32),
         )
 
     def reread(self, index: int, rollout: Rollout, spec: BoundarySpec) -> Rollout:
@@ -180,6 +181,7 @@ class RolloutMaker:
         # Materials have their own random generator, so that motion does not depend on the number of locks.
         others = np.random.default_rng([self.scene.seed, self.scene.held_out, index, 1])
         by_lock += [Material.random(others) for _ in locks[1:]]
+        by_lock = [replace(material, weight=by_lock[0].weight) for material in by_lock]
         by_lock[lock[0]], by_lock[0] = by_lock[0], by_lock[lock[0]]
         shape = self._shape(rng)
         return Draw(which, strands, tuple(by_lock[i] for i in lock), shape, *self._motion(rng, shape))

@@ -124,8 +124,8 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
     file, now = work / INPUTS, _inputs(scene)
     if resume and file.exists():
         try:
-            # simulations of inputs that name no integrator are by implicit Euler
-            before = {"integrator": "implicit Euler"} | json.loads(file.read_text("utf-8"))
+            # what inputs without these names were made with
+            before = {"integrator": "implicit Euler", "material": "as it is"} | json.loads(file.read_text("utf-8"))
             changed = [name for name in now if before[name] != now[name]]
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise NeuralocksError(f"{file}: cannot be read; train without --resume") from None
@@ -165,6 +165,7 @@ def _inputs(scene: TrainingScene) -> dict:
         "motion": _digest([array for clip in clips for array in (clip.times, clip.joints, clip.shape)]),
         "history": scene.spec.to_json(),
         "integrator": INTEGRATOR,
+        "material": "at weight 1",
     }
     return json.loads(json.dumps(facts))  # tuples become lists, as in the file
 

@@ -10,7 +10,9 @@ from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
+from neuralocks_core.wind import Wind
 from tests.core.rig.builders import character as with_elbows
 from tests.core.rigs import HEAD, bind, moved, person
 
@@ -31,6 +33,25 @@ def test_effective_gravity_of_a_jump_is_what_mechanics_says():
     sampler = BoundarySampler(SPEC, person(), moved(times, lambda t: np.stack([0 * t, -0.5 * 9.81 * t**2, 0 * t], -1)))
     newest = history(sampler.vectors([0.7]))[0, 0]
     assert newest[:3] == pytest.approx([0, 1, 0], abs=2e-3)
+
+
+@pytest.mark.parametrize("linear", ["gravity", "velocity"])
+def test_heavy_hair_reads_what_light_hair_reads_in_slower_motion(linear):
+    """Of twice the weight, in a motion and a steady wind; and of the usual weight in the same motion at 1 / sqrt(2) of the speed."""
+    spec, times, root = BoundarySpec(linear=linear), np.arange(0, 4, 1 / 48), np.sqrt(2)
+
+    def sampler(slower):
+        path = lambda t: np.stack([0.1 * np.sin(6 * t / slower), 0 * t, 0 * t], -1)  # noqa: E731
+        return BoundarySampler(spec, person(), moved(times * slower, path, lambda t: swing(t / slower)))
+
+    heavy = Material(bend=2e-3, weight=2.0, damping=8.0).log_ratios()
+    light = Material(bend=1e-3, damping=8.0 / root).log_ratios()
+    wind = (Wind((0, 0, 4), 0.0), Wind((0, 0, 2), 0.0)) if linear == "gravity" else (None, None)
+    read = sampler(1.0).vectors([2.0, 2.7], heavy, wind=wind[0])
+    other = sampler(root).vectors([2.0 * root, 2.7 * root], light, wind=wind[1])
+    weight = spec.slices["material"].start + 1
+    assert (read[:, weight] > 0).all()
+    np.testing.assert_allclose(np.delete(read, weight, 1), np.delete(other, weight, 1), atol=2e-5)
 
 
 def test_constant_speed_is_no_motion():

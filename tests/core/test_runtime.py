@@ -9,12 +9,13 @@ import sys
 import numpy as np
 import pytest
 
-from neuralocks_core import model
+from neuralocks_core import materials, model
 from neuralocks_core.boundary_spec import BoundarySpec
-from neuralocks_core.deformation.clumping import COLUMN, Locks
+from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.deformation.strand_session import StrandSession, strand_inputs
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.materials import RANGES
 from neuralocks_core.network_sizes import PLAIN_STRAND
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.strand_set import scalp_local, strand_set
@@ -26,7 +27,8 @@ from neuralocks_core.training.networks import StrandNet, deform  # noqa: E402
 from tests.strand_models import offsets_of, rewritten, without_rest_points
 
 SPEC = BoundarySpec()
-CLUMPING = SPEC.slices["material"].start + COLUMN
+CLUMPING = SPEC.slices["material"].start + list(RANGES).index("clumping")
+UNREAD = SPEC.slices["material"].start + np.array(materials.UNREAD)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +61,7 @@ def strands():
 
 def test_split_inference_equals_the_whole_network(path, net, strands):
     vector, bind = np.random.default_rng(1).normal(size=(2, SPEC.size)).astype(np.float32)
-    vector[CLUMPING] = bind[CLUMPING] = 0
+    vector[UNREAD] = bind[UNREAD] = 0
     session = StrandSession(StrandModel.load(path), strands)
     session.anchor(bind)
     with torch.no_grad():

@@ -5,10 +5,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.network_sizes import K
 from neuralocks_core.strands.strand_set import StrandSet
+from tests.core.rigs import moved, person
 
 LENGTHS = np.array([0.02, 0.1, 0.3, 0.6])
 EACH = 6
@@ -32,7 +35,9 @@ def locks():
 
 def of(locks, **material):
     """The factor of one hair of each length."""
-    return locks.spread(Material(**material).log_ratios())[::EACH]
+    spec = BoundarySpec()
+    vector = BoundarySampler(spec, person(), moved([0.0])).held_bind(Material(**material).log_ratios())
+    return locks.spread(vector[spec.slices["material"]])[::EACH]
 
 
 def test_a_lock_is_what_ties_join(locks):

@@ -13,6 +13,7 @@ from scipy.integrate import solve_bvp
 from scipy.linalg import eigh
 from scipy.special import j0, jn_zeros
 
+from neuralocks_core.materials import Material, at_weight_one, constants
 from neuralocks_core.reference import simulate
 from neuralocks_core.reference.rest import rest_rods
 
@@ -146,6 +147,24 @@ def test_error_falls_with_the_square_of_the_step():
     tips = [tip(rate) for rate in (60, 120, 240)]
     coarse, fine = (np.abs(a - b).max() for a, b in zip(tips, tips[1:], strict=False))
     assert coarse / fine == pytest.approx(4.0, abs=0.6)
+
+
+def test_heavy_hair_moves_as_light_hair_does_at_another_speed():
+    """Dynamic similarity: networks know hair of weight 1 alone. Stretch and contact are stiff in both, and differ by little."""
+    heavy = Material(bend=2e-3, weight=1.8, damping=9.0, clumping=40.0)
+    ratios, pace = at_weight_one(heavy.log_ratios())
+    assert pace**2 == pytest.approx(1.8)
+    rest = np.concatenate([straight([0, 0, 1]), straight([0.1, 0, 0.995]) + [0.004, 0, 0]])
+    head, time = still(90), np.arange(90) / 60
+    head[:, 0, 3], head[:, 1, 3] = 0.08 * np.sin(9 * time) ** 3, 0.05 * np.sin(7 * time) ** 3
+    options = {"neighbours": np.array([[1], [0]]), "iterations": 60, "tolerance": 1e-7}
+
+    def moved(material, dt):
+        return simulate(rest, head, material=material, dt=dt, **options).points.astype(float)
+
+    one = Material(*map(float, constants(ratios)))
+    slow = moved(one, pace / 60)
+    assert np.abs(moved(heavy, 1 / 60) - slow).max() < 2e-4 < 0.02 < np.abs(moved(one, 1 / 60) - slow).max()
 
 
 def frequency(values, rate):
