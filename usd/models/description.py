@@ -115,7 +115,7 @@ SLIDERS = {
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
     "with vertices 0 and 1 at rest, each vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
     'it, scaled to the length that the edge has with D: its rest length, unless the model\'s `output` is "displacement"',
-    "a game": "the clip is the motion so far: keep the samples of the last (steps + 2) dt seconds. Add one whenever the animation "
+    "a game": "the clip is the motion so far: keep the samples of the last (steps + 2) dt / sqrt(weight) seconds. Add one whenever the animation "
     "has been updated, with the time of that pose, and ask for the newest one's time: frames drawn between two updates would "
     "look like stops. Add no pose that is not finite. Keep times in double. Clear the samples at a cut",
     "blend shapes": "roots and `shape` here are those of the clip's first sample. If the animation changes blend shapes, a bake "
