@@ -161,7 +161,9 @@ def evaluate_command(
 def preview_command(
     baked: Annotated[Path, typer.Argument(help="A bake.")],
     out: Out,
-    frames: Annotated[str | None, typer.Option(help="FIRST:LAST[:STEP] in time codes; all if left out.")] = None,
+    frames: Annotated[
+        str | None, typer.Option(help="FIRST:LAST in time codes, of a strip also :STEP; all if left out.")
+    ] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of one picture in pixels.")] = None,
     view: Annotated[float, typer.Option(help="Degrees from the face to the character's left.")] = 32.0,
     turntable: Annotated[bool, typer.Option("--turntable", help="The camera goes round the character once.")] = False,
