@@ -106,8 +106,7 @@ SLIDERS = {
     + ", ".join(f"{name} goes from {low:g} to {high:g}" for name, (low, high) in RANGES.items())
     + ", motion strength from 0 to 4. They change `material` in the boundary vectors and in `held`; if the model is anchored, then compute "
     "`anchor` again, once: `offsets` of tail.onnx with `anchor` zero and the frame `held`",
-    "weight": "hair of another weight than 1 moves as hair of weight 1 and bend / weight does at another speed: in the history, t_k = "
-    "t - k dt / sqrt(weight), divisions by dt stay, and what wind adds is divided by weight",
+    "weight": "in the history, t_k = t - k dt / sqrt(weight), divisions by dt stay; divide what wind adds by weight",
     "motion strength": "a factor of `history`: 0 is each pose as if held, 1 as trained",
     "wind": _WIND,
     "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
