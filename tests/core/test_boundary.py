@@ -41,8 +41,10 @@ def test_heavy_hair_reads_what_light_hair_reads_in_slower_motion(linear):
     spec, times, root = BoundarySpec(linear=linear), np.arange(0, 4, 1 / 48), np.sqrt(2)
 
     def sampler(slower):
-        path = lambda t: np.stack([0.1 * np.sin(6 * t / slower), 0 * t, 0 * t], -1)  # noqa: E731
-        return BoundarySampler(spec, person(), moved(times * slower, path, lambda t: swing(t / slower)))
+        def sideways(t):
+            return np.stack([0.1 * np.sin(6 * t / slower), 0 * t, 0 * t], -1)
+
+        return BoundarySampler(spec, person(), moved(times * slower, sideways, lambda t: swing(t / slower)))
 
     heavy = Material(bend=2e-3, weight=2.0, damping=8.0).log_ratios()
     light = Material(bend=1e-3, damping=8.0 / root).log_ratios()
