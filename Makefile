@@ -1,6 +1,7 @@
 # make demo   see moving hair: installs the runtime without torch, bakes the shipped shot, makes a picture and a clip
 # make test   installs everything that the tests need, and runs the linter and all tests
 # make addon  builds the Blender extension into dist/
+# make native compiles the C files again, for all platforms
 # make lowest runs the tests of what needs no torch with the oldest packages that pyproject.toml allows
 # PYTHON=/path/to/python3.11 chooses another interpreter (3.11 or newer).
 
@@ -14,7 +15,7 @@ INSTALL = $(BIN)/python $(PIP_INSTALL)
 # One thread a process: the tests run in two processes, and small matrices only get slower with more.
 ONE_THREAD = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: demo test lint tests lowest blender addon bench clean
+.PHONY: demo test lint tests lowest blender addon native bench clean
 
 demo: $(VENV)/installed-demo
 	$(BIN)/neuralocks demo -o $(OUT)
@@ -41,6 +42,9 @@ lowest: $(VENV)/installed-test
 
 addon: $(VENV)/installed-test
 	$(BIN)/python dcc_addon/build.py
+
+native: $(VENV)/installed-test
+	$(BIN)/python -m neuralocks_core.native.build
 
 bench: $(VENV)/installed-test
 	$(BIN)/python -m benchmarks

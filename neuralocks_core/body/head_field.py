@@ -9,6 +9,7 @@ import numpy as np
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.hollows import filled
+from neuralocks_core.body.moving_skin import in_order
 
 CELL = 0.005
 """Distance between grid nodes [m]; on a head, linear interpolation is then accurate to 0.2 mm."""
@@ -54,29 +55,32 @@ class HeadField:
 
     Attributes:
         moving: triangles (M, 3) of which some vertex moves.
+        values: signed distance (X, Y, Z) float32 [m] at each node, infinite where the head is not nearest.
+        low: place of the first node (3,) [m].
+        cell: distance between nodes [m].
     """
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray, still: np.ndarray):
         whole = Collider(points, triangles)
         fixed = still[whole.triangles].all(axis=1)
         self.moving = whole.triangles[~fixed]
-        self.cell, self._low = CELL, np.zeros(3)
-        self._values = np.full((2, 2, 2), np.inf, np.float32)
+        self.cell, self.low = CELL, np.zeros(3)
+        self.values = np.full((2, 2, 2), np.inf, np.float32)
         if not fixed.any():
             return
         held = points[np.unique(whole.triangles[fixed])]
-        self._low, high = held.min(axis=0) - ROOM, held.max(axis=0) + ROOM
-        self.cell = max(CELL, float(np.cbrt(np.prod(high - self._low) / MOST_NODES)))
-        size = np.ceil((high - self._low) / self.cell).astype(int) + 1
-        nodes = self._low + self.cell * np.stack(np.meshgrid(*(np.arange(n) for n in size), indexing="ij"), axis=-1)
+        self.low, high = held.min(axis=0) - ROOM, held.max(axis=0) + ROOM
+        self.cell = max(CELL, float(np.cbrt(np.prod(high - self.low) / MOST_NODES)))
+        size = np.ceil((high - self.low) / self.cell).astype(int) + 1
+        nodes = self.low + self.cell * np.stack(np.meshgrid(*(np.arange(n) for n in size), indexing="ij"), axis=-1)
         value, _, nearest = whole.closest(nodes.reshape(-1, 3), limit=EXACT, proven=False)
         value = filled(value.reshape(size), self.cell).ravel()
         # Nodes nearest to something that moves are unknown, and so is all that is interpolated from them.
-        self._values = np.where(fixed[nearest], value, np.inf).astype(np.float32).reshape(size)
+        self.values = np.where(fixed[nearest], value, np.inf).astype(np.float32).reshape(size)
 
     def near(self, reach: float) -> np.ndarray:
         """Nodes (N, 3) [m] that are inside, or less than `reach` outside."""
-        return self._low + self.cell * np.argwhere(self._values < reach)
+        return self.low + self.cell * np.argwhere(self.values < reach)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance (N,) [m] and its direction (N, 3), float32; infinite where the head is not nearest."""
@@ -84,7 +88,7 @@ class HeadField:
         value, direction = np.full(len(points), np.inf, np.float32), np.zeros((len(points), 3), np.float32)
         if not len(known):
             return value, direction
-        at = self._values.ravel().take(corner + self._offsets).reshape(2, 2, 2, -1)
+        at = self.values.ravel().take(corner + self._offsets).reshape(2, 2, 2, -1)
         with np.errstate(invalid="ignore"):  # infinity minus infinity: unknown, and left out below
             # Interpolated along z, then y, then x, with the slopes along each.
             along_z = at[:, :, 1] - at[:, :, 0]
@@ -98,7 +102,7 @@ class HeadField:
             slope[:, 0] = along_x
             slope[:, 1] = along_y[0] + x * (along_y[1] - along_y[0])
             slope[:, 2] = along_z[0] + x * (along_z[1] - along_z[0])
-            slope /= np.maximum(np.sqrt(np.einsum("ni,ni->n", slope, slope)), np.float32(1e-20))[:, None]
+            slope /= np.maximum(np.sqrt(in_order(slope * slope)), np.float32(1e-20))[:, None]
         sound = np.isfinite(mixed)
         known = known[sound]
         value[known], direction[known] = mixed[sound], slope[sound]
@@ -109,12 +113,12 @@ class HeadField:
         result = np.full(len(points), np.inf, np.float32)
         corner, part, known = self._corners(points)
         nearest = corner + self._strides @ (part > 0.5).astype(np.int32)
-        result[known] = self._values.ravel().take(nearest)
+        result[known] = self.values.ravel().take(nearest)
         return result
 
     @cached_property
     def _strides(self) -> np.ndarray:
-        size = self._values.shape
+        size = self.values.shape
         return np.array([size[1] * size[2], size[2], 1], np.int32)
 
     @cached_property
@@ -125,7 +129,7 @@ class HeadField:
     def _corners(self, points: np.ndarray):
         """Number of the low node of each point's cell (n,), position in it (3, n), and which points (n,) are in the grid."""
         place = np.ascontiguousarray(points.T, np.float32)
-        place = place - self._low.astype(np.float32)[:, None]
+        place = place - self.low.astype(np.float32)[:, None]
         place *= np.float32(1 / self.cell)
         held = (place >= 0) & (place < self._most)
         known = (held[0] & held[1] & held[2]).nonzero()[0]
@@ -135,4 +139,4 @@ class HeadField:
 
     @cached_property
     def _most(self) -> np.ndarray:
-        return np.array(self._values.shape, np.float32)[:, None] - 1
+        return np.array(self.values.shape, np.float32)[:, None] - 1

@@ -4,10 +4,14 @@
 Samples are chosen once. Each frame only poses them and puts them into a grid; no tree is built.
 """
 
+from functools import cached_property
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.body.collider import split_triangle
+from neuralocks_core.native.library import library
+from neuralocks_core.native.posed_skin import pose_skin
 
 SPACING = 0.010
 """Distance between samples on the skin [m]; half or a quarter of it where triangles are that small."""
@@ -15,6 +19,8 @@ NEIGHBOURS = 8
 """Samples that are blended; the first is the sample itself."""
 CELL = 0.012
 """Width of the grid's cells [m]. A sample is entered in its own cell and those around it."""
+SKIN = 2
+"""Bit of a marked cell."""
 DEPTH = 3
 """Cells below the skin into which a sample is entered too: hair may get that deep."""
 ENOUGH_SAMPLES = 20_000
@@ -76,8 +82,8 @@ class Skin:
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray):
         triangle, part, spacing = _sampled(points, triangles)
-        self._corners, self._part = triangles[triangle], part.astype(np.float32)
-        place, normal = self.planes(points)
+        self.corners, self.part = triangles[triangle].astype(np.int32), part.astype(np.float32)
+        place, normal = _planes(points, self.corners, self.part)
         count = min(NEIGHBOURS, len(place))
         self.square = np.square(spacing).astype(np.float32)
         tree = cKDTree(place)
@@ -90,22 +96,6 @@ class Skin:
         self.near = np.where(other | (far > AROUND * spacing[:, None]), own, near).astype(np.int32)
         self.counted = np.where((self.near == own) & (np.arange(count) > 0), 0, 1).astype(np.float32)
 
-    def planes(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places and unit normals (N, 3) float32 of the samples for mesh points (V, 3)."""
-        points = np.asarray(points, np.float32)
-        a, b, c = (points.take(self._corners[:, i], axis=0) for i in range(3))
-        b -= a
-        c -= a
-        normal = np.stack(
-            [b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1], b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2],
-             b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]], axis=1)  # fmt: skip
-        normal /= np.maximum(np.sqrt(np.einsum("ni,ni->n", normal, normal)), np.float32(1e-20))[:, None]
-        b *= self._part[:, :1]
-        c *= self._part[:, 1:]
-        a += b
-        a += c
-        return a, normal
-
 
 class PosedSkin:
     """Skin in one pose.
@@ -113,62 +103,47 @@ class PosedSkin:
     Args:
         skin: its samples.
         points: of the whole mesh in this pose (V, 3) [m].
-        box: the grid; its cells near the skin are marked with `bit`.
-        marks: (box.count,) uint8, changed.
-        bit: what to add.
+        box: the grid.
+        marks: (box.count,) uint8; cells near the skin get the bit SKIN.
         low, high: corners (3,) [m] of the space that will be queried.
+
+    Attributes:
+        skin: its samples.
+        start: a sample near each cell (box.count,) int32, arbitrary in cells that are not marked.
+        planes: place and unit normal (N, 6) float32 of each sample.
     """
 
-    def __init__(self, skin: Skin, points: np.ndarray, box: Box, marks: np.ndarray, bit: int, low, high):
-        self._skin = skin
-        place, normal = skin.planes(points)
-        self._plane = np.concatenate([place, normal], axis=1)
-        self._place, self._normal = (np.ascontiguousarray(each.T) for each in (place, normal))
-        self._start = np.empty(box.count, np.int32)
+    def __init__(self, skin: Skin, points: np.ndarray, box: Box, marks: np.ndarray, low, high):
+        self.skin = skin
         room = (DEPTH + 1) * box.cell
         low = np.maximum(low - room, box.low + room).astype(np.float32)
         high = np.minimum(high + room, box.low + box.size * box.cell - room).astype(np.float32)
-        held = [(x > a) & (x < b) for x, a, b in zip(self._place, low, high)]
-        asked = np.flatnonzero(held[0] & held[1] & held[2])
-        place, normal = place.take(asked, axis=0), normal.take(asked, axis=0)
-        entered = np.zeros(box.count, np.uint8)
-
-        def enter(cells: np.ndarray) -> None:
-            self._start[cells] = asked
-            entered[cells] = bit
-
-        # From the farthest cells to a sample's own: the last one entered is the nearest.
-        for depth in range(DEPTH, 0, -1):
-            enter(box.cells(place - normal * np.float32(depth * box.cell)))
-        own = box.cells(place)
-        # Around them, of samples in one cell the last one stands for all.
-        self._start[own] = asked
-        last = self._start.take(own) == asked
-        own, asked = own[last], asked[last]
-        around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-        for step in around[np.argsort(-np.abs(around).sum(axis=1), kind="stable")] @ box.strides:
-            enter(own + np.int32(step))
-        marks |= entered
+        posed = pose_skin if library() else _posed
+        self.planes, self.start = posed(box, low, high, points, skin.corners, skin.part, marks)
 
     def rough(self, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Height [m] above the plane of a nearby sample, (N,), of points (N, 3) float32 in marked cells."""
-        plane = self._plane.take(self._start.take(cells), axis=0)
+        plane = self.planes.take(self.start.take(cells), axis=0)
         offset = points - plane[:, :3]
         offset *= plane[:, 3:]
         return offset[:, 0] + offset[:, 1] + offset[:, 2]
+
+    @cached_property
+    def _columns(self) -> np.ndarray:
+        return np.ascontiguousarray(self.planes.T)
 
     def distance(self, points: np.ndarray, cells: np.ndarray, head: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance (N,) [m] and its direction (N, 3) of points (N, 3) in marked cells.
 
         Infinite beyond the rim, and where the head, at the distances `head` (N,), is nearer than a sample.
         """
-        skin = self._skin
-        sample = self._start.take(cells)
+        skin = self.skin
+        sample = self.start.take(cells)
         place = np.ascontiguousarray(points.T, np.float32)[:, :, None]
         rows = np.arange(len(points))
         for _ in range(3):  # downhill from neighbour to neighbour
             near = skin.near.take(sample, axis=0)
-            off = place - self._place.take(near, axis=1)
+            off = place - self._columns[:3].take(near, axis=1)
             squares = off * off
             squared = squares[0] + squares[1]
             squared += squares[2]
@@ -183,19 +158,71 @@ class PosedSkin:
         weight = np.maximum(1 - (squared - nearest[:, None]) / (REACH * square)[:, None], 0)
         weight *= weight
         weight *= skin.counted.take(first, axis=0)
-        normal = self._normal.take(near, axis=1)
+        normal = self._columns[3:].take(near, axis=1)
         off *= normal
         height = off[0]
         height += off[1]
         height += off[2]
-        value = np.einsum("nk,nk->n", height, weight) / np.einsum("nk->n", weight)
-        direction = np.ascontiguousarray(np.einsum("ank,nk->an", normal, weight).T)
-        direction /= np.maximum(np.sqrt(np.einsum("ni,ni->n", direction, direction)), np.float32(1e-20))[:, None]
+        value = in_order(height * weight) / in_order(weight)
+        direction = np.ascontiguousarray(in_order(normal * weight).T)
+        direction /= np.maximum(np.sqrt(in_order(direction * direction)), np.float32(1e-20))[:, None]
         beyond = nearest - value * value > BESIDE * square
         beyond |= nearest - 0.5 * square > head * head
         # A shoulder is thinner than the grid is deep: what is below its front may be behind its back.
         beyond |= -value > skin.thick.take(first) + np.float32(THIN)
         return np.where(beyond, np.inf, value), direction
+
+
+def _posed(box: Box, low, high, points, corners, part, marks) -> tuple[np.ndarray, np.ndarray]:
+    """What `posed_skin.c` computes: its description, and what runs where that does not. See `pose_skin` for the arguments."""
+    place, normal = _planes(points, corners, part)
+    planes, start = np.concatenate([place, normal], axis=1), np.empty(box.count, np.int32)
+    asked = np.flatnonzero(((place > low) & (place < high)).all(axis=1))
+    place, normal = place.take(asked, axis=0), normal.take(asked, axis=0)
+
+    def enter(cells: np.ndarray) -> None:
+        start[cells] = asked
+        marks[cells] |= np.uint8(SKIN)
+
+    # From the farthest cells to a sample's own: the last one entered is the nearest.
+    for depth in range(DEPTH, 0, -1):
+        enter(box.cells(place - normal * np.float32(depth * box.cell)))
+    own = box.cells(place)
+    # Around them, of samples in one cell the last one stands for all.
+    start[own] = asked
+    last = start.take(own) == asked
+    own, asked = own[last], asked[last]
+    around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    for step in around[np.argsort(-np.abs(around).sum(axis=1), kind="stable")] @ box.strides:
+        enter(own + np.int32(step))
+    return planes, start
+
+
+def _planes(points: np.ndarray, corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places and unit normals (N, 3) float32 of samples on triangles (N, 3) of points (V, 3) [m], at `part` (N, 2) of each."""
+    points = np.asarray(points, np.float32)
+    a, b, c = (points.take(corners[:, i], axis=0) for i in range(3))
+    b -= a
+    c -= a
+    normal = np.stack(
+        [b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1], b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2],
+         b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]], axis=1)  # fmt: skip
+    normal /= np.maximum(np.sqrt(in_order(normal * normal)), np.float32(1e-20))[:, None]
+    b *= part[:, :1]
+    c *= part[:, 1:]
+    a += b
+    a += c
+    return a, normal
+
+
+def in_order(terms: np.ndarray) -> np.ndarray:
+    """Sums (...) over the last axis of terms (..., k), from the first to the last: numpy's own order depends on the machine, and
+    compiled code is to give the same bits.
+    """
+    total = terms[..., 0].copy()
+    for i in range(1, terms.shape[-1]):
+        total += terms[..., i]
+    return total
 
 
 def _thickness(place: np.ndarray, normal: np.ndarray, tree: cKDTree) -> np.ndarray:

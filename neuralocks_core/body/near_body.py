@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The body close to hair: the head from a grid built once, the skin that moves relative to it posed in each frame."""
 
+from functools import cached_property
+
 import numpy as np
 import scipy.sparse
 
 from neuralocks_core.body.head_field import head_field
-from neuralocks_core.body.moving_skin import Box, PosedSkin, Skin
+from neuralocks_core.body.moving_skin import SKIN, Box, PosedSkin, Skin
+from neuralocks_core.native.body import Box as NativeBox
+from neuralocks_core.native.keep_out import KeepOut
 from neuralocks_core.rotation import transformed
 from neuralocks_core.skinned_body import Body
 
-HEAD, SKIN = 1, 2
+HEAD = 1
 CURVED = 0.004
 """How far skin may bend away from the plane of a nearby sample [m]."""
+CLOSE = 0.9
+"""How far a point's distance to the head is from that of the nearest node, at most, in cells."""
 
 
 class NearBody:
@@ -57,7 +63,7 @@ class NearBody:
         blended = self._weights @ skinning[: self._weights.shape[1], :3].reshape(-1, 12)
         x, y, z = points.T[:, :, None]
         points = blended[:, 0::4] * x + blended[:, 1::4] * y + blended[:, 2::4] * z + blended[:, 3::4]
-        return PosedBody(self, PosedSkin(self.skin, points, self.box, marks, SKIN, low, high), marks)
+        return PosedBody(self, PosedSkin(self.skin, points, self.box, marks, low, high), marks)
 
 
 class PosedBody:
@@ -85,11 +91,33 @@ class PosedBody:
                 value[rows[nearer]], direction[rows[nearer]] = other[nearer], way[nearer]
         return value.reshape(points.shape[:-1]), direction.reshape(points.shape)
 
-    def violated(self, points: np.ndarray, low: np.ndarray) -> np.ndarray:
-        """Numbers of the strands (n,) of points (S, K, 3) float32 with a vertex nearer than `low` (S, K) [m].
+    def compiled(self, vertices: int) -> KeepOut | None:
+        """Compiled code on this body for strands of so many vertices, if there is some for them and for this machine."""
+        neighbours = 0 if self._skin is None else self._skin.skin.near.shape[1]
+        return self._compiled if KeepOut.serves(vertices, neighbours) else None
 
-        One lookup in a grid clears most vertices.
-        """
+    @cached_property
+    def _compiled(self) -> KeepOut:
+        box, head, posed = NativeBox.of(self._near.box), self._near.head, self._skin
+        fields = {
+            "box": box, "marks": self._marks, "head_low": head.low, "head_per_cell": 1 / head.cell, "head_close": CLOSE * head.cell,
+            "head_size": head.values.shape, "head_values": head.values,
+        }  # fmt: skip
+        if posed is not None:
+            skin = posed.skin
+            fields |= {
+                "start": posed.start, "planes": posed.planes, "near": skin.near, "neighbours": skin.near.shape[1],
+                "square": skin.square, "thick": skin.thick, "counted": skin.counted,
+            }  # fmt: skip
+        return KeepOut(fields)
+
+    def violated(self, points: np.ndarray, low: np.ndarray) -> np.ndarray:
+        """Numbers of the strands (n,) of points (S, K, 3) float32 with a vertex nearer than `low` (S, K) [m]."""
+        compiled = self.compiled(points.shape[1])
+        return self._violated(points, low) if compiled is None else compiled.violated(points, low)
+
+    def _violated(self, points: np.ndarray, low: np.ndarray) -> np.ndarray:
+        """What `keep_out.c` computes. One lookup in a grid clears most vertices."""
         each = points.shape[1]
         cells = self._near.box.cells(points).ravel()
         marks = self._marks.take(cells)
@@ -99,7 +127,7 @@ class PosedBody:
         close = (marks & HEAD).astype(bool)
         at = np.flatnonzero(close)
         close[at] = self._near.head.rough(points.take(at, axis=0)) < low.take(at) + np.float32(
-            0.9 * self._near.head.cell
+            CLOSE * self._near.head.cell
         )
         if self._skin is not None:
             at = np.flatnonzero(marks & SKIN)

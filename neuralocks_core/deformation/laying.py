@@ -40,6 +40,27 @@ def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarr
     Returns:
         (S, K, 3) float32.
     """
+    compiled = body.compiled(points.shape[1])
+    return _resolved(points, body, clear) if compiled is None else compiled.laid(points, clear)
+
+
+def rest_distance(points: np.ndarray, body: PosedBody) -> np.ndarray:
+    """Signed distance (S, K) float32 [m] of strands (S, K, 3) at rest, measured as `resolved` does."""
+    return _measured(np.ascontiguousarray(points.transpose(1, 2, 0)), body)[0].T
+
+
+def clearance(rest_distance: np.ndarray) -> np.ndarray:
+    """Distance (S, K) float32 [m] that each vertex must keep, from the signed distance in the bind pose (S, K) [m].
+
+    Hair that rests inside the body, or closer than the margin, is not pushed beyond where it rests.
+    """
+    clear = np.minimum(rest_distance, MARGIN).astype(np.float32)
+    clear[:, :CLAMPED] = -np.inf
+    return clear
+
+
+def _resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarray:
+    """What `keep_out.c` computes: its description, and what runs where that does not."""
     # Vertices first, strands last: what is done to one vertex of all strands is one contiguous array.
     wanted = np.ascontiguousarray(np.asarray(points, float).transpose(1, 2, 0))
     keep = np.ascontiguousarray(clear.T, float)
@@ -56,21 +77,6 @@ def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarr
             laid[:, :, worse] = some[:, :, worse]
         wanted[:, :, todo] = laid
     return wanted.transpose(2, 0, 1).astype(np.float32)
-
-
-def rest_distance(points: np.ndarray, body: PosedBody) -> np.ndarray:
-    """Signed distance (S, K) float32 [m] of strands (S, K, 3) at rest, measured as `resolved` does."""
-    return _measured(np.ascontiguousarray(points.transpose(1, 2, 0)), body)[0].T
-
-
-def clearance(rest_distance: np.ndarray) -> np.ndarray:
-    """Distance (S, K) float32 [m] that each vertex must keep, from the signed distance in the bind pose (S, K) [m].
-
-    Hair that rests inside the body, or closer than the margin, is not pushed beyond where it rests.
-    """
-    clear = np.minimum(rest_distance, MARGIN).astype(np.float32)
-    clear[:, :CLAMPED] = -np.inf
-    return clear
 
 
 def _measured(points: np.ndarray, body: PosedBody) -> tuple[np.ndarray, np.ndarray]:
@@ -94,12 +100,13 @@ def _laid(wanted, keep, distance, way, body: PosedBody) -> tuple[np.ndarray, np.
     result, edges = wanted.copy(), np.diff(wanted, axis=0)
     lengths = np.sqrt(np.square(edges).sum(axis=1))
     moved, hard = np.zeros((2, wanted.shape[2]), bool)
-    for i in range(max(1, int((keep - distance > SLACK).any(axis=1).argmax())), len(wanted)):
+    first = (keep - distance > SLACK).argmax(axis=0)
+    for i in range(max(1, int(first.min())), len(wanted)):
         before, length = result[i - 1], lengths[i - 1]
         end = np.where(moved, before + _aimed(edges[i - 1], wanted[i - 1] - before, length), wanted[i])
         # A distance changes by little more than the vertex moves: most need not be measured again.
         known = np.where(np.isinf(distance[i]), UNSEEN, distance[i])
-        near = np.flatnonzero(known - 1.2 * _size(end - wanted[i]) < keep[i])
+        near = np.flatnonzero((known - 1.2 * _size(end - wanted[i]) < keep[i]) & (first <= i))
         depth, out = distance[i].copy(), way[i].copy()
         distance[i, moved] = np.inf
         least = np.minimum(distance[i - 1], 0) - 1.1 * length - STEEP

@@ -25,10 +25,8 @@ STEP, ROOM = 0.1, 0.1
 """The ball that hair can reach is enlarged [m]: to the next multiple of STEP, plus ROOM."""
 DEEP = 0.02
 """A strand that rests deeper than this [m] is checked in every frame: its next vertices may lie where nothing is known."""
-BATCH = 2048
-"""Strands checked together."""
-PUSHED = 1024
-"""Strands pushed together."""
+BATCH = 1024
+"""Strands checked and pushed together."""
 WORN = 0.01
 """A root deeper in the body than this [m] is not on its skin, but under something worn."""
 
@@ -135,8 +133,8 @@ class Resolver:
         body, distance = self._rested()
         inside = np.flatnonzero((distance[:, 1:] < 0).any(axis=1) & (distance[:, 0] > -WORN) & self.strands.valid)
         inside = inside[self._truly(inside, distance[inside])]
-        for i in range(0, len(inside), PUSHED):
-            rows = inside[i : i + PUSHED]
+        for i in range(0, len(inside), BATCH):
+            rows = inside[i : i + BATCH]
             clear = np.full(distance[rows].shape, MARGIN, np.float32)
             clear[:, 0] = -np.inf
             moved[rows] = resolved(self._rest[rows], body, clear) - self._rest[rows]
@@ -158,14 +156,14 @@ class Resolver:
         parts = [slice(i, min(i + BATCH, len(rest))) for i in range(0, len(rest), BATCH)]
         edges = np.array(list(each(lambda s: _corners(rest[s] + displacement[s]), parts)))
         body = self._posed(joints, shape, edges[:, 0].min(axis=0), edges[:, 1].max(axis=0))
-        hit = list(each(lambda s: body.violated(rest[s] + displacement[s], clear[s] - SLACK) + s.start, parts))
-        hit = np.union1d(np.concatenate(hit), self._deep)
-        hit = hit[self.strands.valid[hit]]
 
-        def push(rows: np.ndarray) -> None:
+        def push(s: slice) -> None:
+            hit = self._always[s].copy()
+            hit[body.violated(rest[s] + displacement[s], clear[s] - SLACK)] = True
+            rows = s.start + np.flatnonzero(hit & self.strands.valid[s])
             displacement[rows] = resolved(rest[rows] + displacement[rows], body, clear[rows]) - rest[rows]
 
-        for _ in each(push, [hit[i : i + PUSHED] for i in range(0, len(hit), PUSHED)]):
+        for _ in each(push, parts):
             pass
 
     def _posed(self, joints, shape, low, high) -> PosedBody:
@@ -191,8 +189,8 @@ class Resolver:
         return body, np.concatenate(parts)
 
     @cached_property
-    def _deep(self) -> np.ndarray:
-        return np.flatnonzero((self.clear[:, CLAMPED:] < -DEEP).any(axis=1))
+    def _always(self) -> np.ndarray:
+        return (self.clear[:, CLAMPED:] < -DEEP).any(axis=1)
 
     def serves(self, clip: Clip) -> bool:
         """Whether a resolver made for this clip would give the same results."""

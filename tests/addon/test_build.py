@@ -5,6 +5,8 @@ import json
 import zipfile
 
 from dcc_addon import build
+from neuralocks_core.native.build import TARGETS
+from neuralocks_core.native.library import file_for
 
 
 def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
@@ -14,6 +16,7 @@ def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
     shipped = {"strands.neuralocks", "rig.neuralocks", "shot/shot.usda"}
     assert {f"neuralocks_core/shipped/{name}" for name in shipped} <= listed
     assert {"usd/cli/app.py", "neuralocks_core/rig/hair.h.in"} <= listed
+    assert {f"neuralocks_core/native/libraries/{file_for(target).name}" for target in TARGETS} <= listed
     assert {name.split("/licenses/")[1] for name in listed if "/licenses/" in name} == {"LICENSE", "CREDITS.md"}
     assert {name.split("/")[0].split("-")[0] for name in listed} == {"neuralocks_core", "usd", "neuralocks"}
     assert not any("__pycache__" in name for name in listed)

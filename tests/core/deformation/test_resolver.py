@@ -157,7 +157,7 @@ def test_a_giant_takes_no_more_work_than_a_person(nods):
     """As large as a character in the wrong unit; its hair is pushed like a person's."""
 
     def nodes(resolver):
-        return np.array([resolver._near.head._values.size, resolver._near.box.count])
+        return np.array([resolver._near.head.values.size, resolver._near.box.count])
 
     (moved, person), (far, giant) = pushed(1, nods), pushed(64, nods)
     assert (len(person._near.head.moving) > 0) == nods and np.abs(moved - 0.01).max() > 0.005
@@ -196,7 +196,7 @@ def test_a_trunk_that_stands_still_is_not_part_of_the_heads_grid():
     hair = strand_set(Groom("Hair", strands(turn=0.5).reshape(-1, 3) + origin, np.full(60, 24)), origin, np.zeros(3))
     resolver = Resolver(Character(rigs.person().skeleton, body), hair, Clip([0.0], rigs.bind()[None]))
     outside = (resolver.at_rest.distance(hair.rest)[0] > 0).all(axis=1)
-    assert resolver._near.head.cell == 0.005 and resolver._near.head._values.shape[1] < 60
+    assert resolver._near.head.cell == 0.005 and resolver._near.head.values.shape[1] < 60
     moved = np.zeros((60, 24, 3), np.float32)
     moved[:, 2:] = -0.5 * hair.rest[:, 2:] * [1, 0, 1]
     pulled = hair.rest + moved

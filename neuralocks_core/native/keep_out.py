@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`keep_out.c` on numpy's arrays: hair kept out of a body in a pose."""
+
+import ctypes
+from collections.abc import Mapping
+from ctypes import c_int64
+
+import numpy as np
+
+from neuralocks_core.native.body import MOST_NEIGHBOURS, at, filled
+from neuralocks_core.native.library import library
+
+VERTICES = 24
+"""Of a strand: the size of arrays in C."""
+
+
+class KeepOut:
+    """One body in one pose. Both functions give the bits of the numpy ones that they stand in for.
+
+    Args:
+        fields: of `Body` in `body.h`, arrays in the layout given there.
+    """
+
+    def __init__(self, fields: Mapping[str, object]):
+        self._body, self._kept = filled(fields)
+
+    @staticmethod
+    def serves(vertices: int, neighbours: int) -> bool:
+        """Whether there is compiled code for this machine, strands of so many vertices, and skin of so many neighbours."""
+        return vertices == VERTICES and neighbours <= MOST_NEIGHBOURS and library() is not None
+
+    def violated(self, points: np.ndarray, low: np.ndarray) -> np.ndarray:
+        """As `PosedBody.violated`."""
+        points, low = (np.ascontiguousarray(each, np.float32) for each in (points, low))
+        out = np.empty(len(points), np.uint8)
+        library().neuralocks_violated(ctypes.byref(self._body), at(points), at(low), c_int64(len(points)), at(out))
+        return np.flatnonzero(out)
+
+    def laid(self, points: np.ndarray, keep: np.ndarray) -> np.ndarray:
+        """As `laying.resolved`."""
+        result, keep = np.array(points, np.float32, order="C"), np.ascontiguousarray(keep, np.float32)
+        library().neuralocks_lay(ctypes.byref(self._body), at(result), at(keep), c_int64(len(result)))
+        return result
