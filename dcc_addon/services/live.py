@@ -12,7 +12,7 @@ from neuralocks_core.deformation.root_skin import ASTRAY, RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
-from neuralocks_core.runtime import StrandModel, chunks
+from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.strand_set import strands_on
 from neuralocks_core.wind import Wind
 
@@ -111,8 +111,7 @@ class LiveHair:
         resolve = resolve and self.character.body is not None
         if resolve or self._skin.moves:
             moved = self._moved(vector, joints, shape, resolve)
-            for strands in chunks(len(moved)):
-                place(strands, moved[strands])
+            self.model.by_chunk(lambda strands: place(strands, moved[strands]), len(moved))
         else:
             self._session.each(vector, place)
         self._shown = wanted

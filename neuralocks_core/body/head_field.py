@@ -9,7 +9,7 @@ import numpy as np
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.hollows import filled
-from neuralocks_core.body.moving_skin import in_order
+from neuralocks_core.sums import dot
 
 CELL = 0.005
 """Distance between grid nodes [m]; on a head, linear interpolation is then accurate to 0.2 mm."""
@@ -102,7 +102,7 @@ class HeadField:
             slope[:, 0] = along_x
             slope[:, 1] = along_y[0] + x * (along_y[1] - along_y[0])
             slope[:, 2] = along_z[0] + x * (along_z[1] - along_z[0])
-            slope /= np.maximum(np.sqrt(in_order(slope * slope)), np.float32(1e-20))[:, None]
+            slope /= np.maximum(np.sqrt(dot(slope, slope)), np.float32(1e-20))[:, None]
         sound = np.isfinite(mixed)
         known = known[sound]
         value[known], direction[known] = mixed[sound], slope[sound]

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.body.collider import split_triangle
 from neuralocks_core.native.library import library
 from neuralocks_core.native.posed_skin import pose_skin
+from neuralocks_core.sums import dot, in_order
 
 SPACING = 0.010
 """Distance between samples on the skin [m]; half or a quarter of it where triangles are that small."""
@@ -163,9 +164,9 @@ class PosedSkin:
         height = off[0]
         height += off[1]
         height += off[2]
-        value = in_order(height * weight) / in_order(weight)
+        value = dot(height, weight) / in_order(weight)
         direction = np.ascontiguousarray(in_order(normal * weight).T)
-        direction /= np.maximum(np.sqrt(in_order(direction * direction)), np.float32(1e-20))[:, None]
+        direction /= np.maximum(np.sqrt(dot(direction, direction)), np.float32(1e-20))[:, None]
         beyond = nearest - value * value > BESIDE * square
         beyond |= nearest - 0.5 * square > head * head
         # A shoulder is thinner than the grid is deep: what is below its front may be behind its back.
@@ -207,22 +208,12 @@ def _planes(points: np.ndarray, corners: np.ndarray, part: np.ndarray) -> tuple[
     normal = np.stack(
         [b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1], b[:, 2] * c[:, 0] - b[:, 0] * c[:, 2],
          b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]], axis=1)  # fmt: skip
-    normal /= np.maximum(np.sqrt(in_order(normal * normal)), np.float32(1e-20))[:, None]
+    normal /= np.maximum(np.sqrt(dot(normal, normal)), np.float32(1e-20))[:, None]
     b *= part[:, :1]
     c *= part[:, 1:]
     a += b
     a += c
     return a, normal
-
-
-def in_order(terms: np.ndarray) -> np.ndarray:
-    """Sums (...) over the last axis of terms (..., k), from the first to the last: numpy's own order depends on the machine, and
-    compiled code is to give the same bits.
-    """
-    total = terms[..., 0].copy()
-    for i in range(1, terms.shape[-1]):
-        total += terms[..., i]
-    return total
 
 
 def _thickness(place: np.ndarray, normal: np.ndarray, tree: cKDTree) -> np.ndarray:

@@ -8,20 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from neuralocks_core.deformation.following import Following
-from neuralocks_core.deformation.scratch import Scratch, in_turn
+from neuralocks_core.native.carry import Carry
 from neuralocks_core.strands.arclength import arc_lengths
+from neuralocks_core.sums import in_order
 
 if TYPE_CHECKING:
     from neuralocks_core.groom import Groom
     from neuralocks_core.strands.strand_set import StrandSet
-
-POINTS = 16384
-"""Approximate number of points carried at a time: their data stays in the processor's second-level cache."""
-
-BLOCK = 512
-"""Strands prepared together, so that preparation needs little memory besides its result; also the most carried at once."""
-
-_scratch = Scratch()
 
 
 class Placing(NamedTuple):
@@ -63,37 +56,22 @@ class Carrier:
     def __init__(self, groom: Groom, strands: StrandSet) -> None:
         self._groom = groom
         self._vertices = strands.rest.shape[1:]
-        self._still = None if strands.valid.all() else ~strands.valid
+        self._still = ~strands.valid
         self._facing = None if np.array_equal(strands.facing, np.eye(3)) else strands.facing.astype(np.float32)
-        self._ends = np.concatenate([groom.starts, [len(groom.points)]])
-        self._negative_zero = bool((np.signbit(groom.points) & (groom.points == 0)).any())
-
-        # A power of two, so that no chunk reaches across a border of BLOCK.
-        each = POINTS * groom.strand_count / max(len(groom.points), 1)
-        self._chunk = 2 ** int(np.clip(np.log2(max(each, 1.0)), 4, np.log2(BLOCK)))
+        self._ends = np.concatenate([groom.starts, [len(groom.points)]]).astype(np.int64)
         rest = strands.rest if self._facing is None else self._in_bind_axes(strands.rest)
         own = groom.points - strands.head_origin
         direct = bool((groom.counts == len(rest[0])).all()) and bool(
             np.abs(own.reshape(rest.shape) - rest)[strands.valid].max(initial=0.0) < 1e-6
         )
-        self._blocks = [] if direct else self._followed(rest, own, strands)
-
-    def _followed(self, rest: np.ndarray, own: np.ndarray, strands: StrandSet) -> list:
-        """How each block's own vertices follow the network's."""
-        groom, count = self._groom, len(rest)
-        arc, length = arc_lengths(groom)
-        place = arc / np.where(strands.valid, length, 1.0)[groom.strand_of_point] * (self._vertices[0] - 1)
-        blocks = []
-        for low in range(0, count, BLOCK):
-            some = slice(low, min(low + BLOCK, count))
-            here = slice(self._ends[low], self._ends[some.stop])
-            blocks.append(Following(rest[some], strands.valid[some], own[here], groom.counts[some], place[here]))
-        return blocks
-
-    def _in_bind_axes(self, vectors: np.ndarray) -> np.ndarray:
-        # The inverse of a rotation: rows times R are columns times its transpose. All rows at once: one product for each
-        # strand's few takes twice as long.
-        return (vectors.reshape(-1, 3) @ self._facing).reshape(vectors.shape)
+        self._following = None
+        if not direct:
+            arc, length = arc_lengths(groom)
+            place = arc / np.where(strands.valid, length, 1.0)[groom.strand_of_point] * (self._vertices[0] - 1)
+            self._following = Following(rest, strands.valid, own, groom.counts, place)
+        self._compiled = None
+        if Carry.serves(self._vertices[0]):
+            self._compiled = Carry(groom.points, self._ends, self._still, self._facing, self._following)
 
     def carry(
         self,
@@ -123,61 +101,37 @@ class Carrier:
             raise ValueError("strands must be consecutive")
         if displacement.shape != (last - first, *self._vertices):
             raise ValueError(f"displacement {displacement.shape} for {last - first} strands")
-        begin = self._ends[first]
+        here = slice(self._ends[first], self._ends[last])
         onto = self._groom.points if placing is None else onto
         if out is None:
-            out = np.empty((self._ends[last] - begin, 3), np.float32)
-        start = first
-        while start < last:
-            stop = min(start - start % self._chunk + self._chunk, last)
-            here = slice(self._ends[start], self._ends[stop])
-            some = np.asarray(displacement[start - first : stop - first], np.float32)
-            part = out[here.start - begin : here.stop - begin]
-            self._carried(some, start, stop, part, placing, None if onto is None else onto[here])
-            start = stop
+            out = np.empty((here.stop - here.start, 3), np.float32)
+        onto = None if onto is None else onto[here]
+        carry = self._carried if self._compiled is None else self._compiled.carry
+        carry(np.asarray(displacement, np.float32), first, last, placing, onto, out)
         return out
 
-    def _carried(self, displacement, start, stop, out, placing, onto) -> None:
-        """`carry` of one chunk, in arrays whose coordinates come first."""
-        if self._still is not None:
-            displacement = np.where(self._still[start:stop, None, None], np.float32(0.0), displacement)
-        rest = self._groom.points[self._ends[start] : self._ends[stop]]
-        if onto is None and not self._blocks:
-            self._carried_at_once(displacement, rest, out, placing)
-            return
+    def _carried(self, displacement, start: int, stop: int, placing: Placing | None, onto, out: np.ndarray) -> None:
+        """What `carry.c` computes: its description, and what runs where that does not."""
+        points = self._groom.points[self._ends[start] : self._ends[stop]]
+        displacement = np.where(self._still[start:stop, None, None], np.float32(0.0), displacement)
         if self._facing is not None:
             displacement = self._in_bind_axes(displacement)
-        block = self._blocks[start // BLOCK] if self._blocks else None
-        columns = block.columns if block else np.transpose
-        (points,) = _scratch.arrays(columns(rest).shape)
-        across = (3, *[1] * (points.ndim - 1))
-        if onto is None:
-            np.subtract(columns(rest), placing.centre.reshape(across), out=points)
+        if self._following is None:
+            moved = displacement.reshape(-1, 3)
         else:
-            points[:] = columns(rest)
-        moved = block.moved(displacement, start % BLOCK, points) if block else displacement.reshape(-1, 3).T
+            moved = self._following.moved(displacement, start, points)
         if onto is None:
-            points += moved
-            np.add(_placed(placing.linear, points), placing.origin.reshape(across), out=columns(out))
+            out[:] = _times(placing.linear, (points - placing.centre) + moved) + placing.origin
             return
         if placing is not None:
-            moved = _placed(placing.linear, moved)
-        np.add(columns(onto), moved, out=columns(out))
-        if self._negative_zero:  # -0 + 0 is +0: the only value that adding zero changes
-            np.copyto(columns(out), columns(onto), where=moved == 0)
+            moved = _times(placing.linear, moved)
+        out[:] = np.where(moved == 0, onto, onto + moved)  # -0 + 0 would be +0
 
-    def _carried_at_once(self, displacement, rest, out, placing) -> None:
-        """`_carried` if the groom's vertices are the network's: placed and turned from the network's axes in one step."""
-        both, result = in_turn.arrays((6, len(rest)), (3, len(rest)))
-        np.subtract(rest.T, placing.centre[:, None], out=both[:3])
-        both[3:] = displacement.reshape(-1, 3).T
-        turned = placing.linear if self._facing is None else placing.linear @ self._facing.T
-        np.matmul(np.hstack([placing.linear, turned]), both, out=result)
-        np.add(result, placing.origin[:, None], out=out.T)
+    def _in_bind_axes(self, vectors: np.ndarray) -> np.ndarray:
+        # The inverse of a rotation: rows times R are columns times its transpose.
+        return _times(self._facing.T, vectors)
 
 
-def _placed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """A matrix (3, 3) times vectors (3, ...); valid until this thread's next step."""
-    (result,) = in_turn.arrays(vectors.shape)
-    np.matmul(matrix, vectors.reshape(3, -1), out=result.reshape(3, -1))
-    return result
+def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """A matrix (3, 3) times vectors (..., 3)."""
+    return in_order(vectors[..., None, :] * matrix)

@@ -106,19 +106,19 @@ class StrandSession:
         return self._by_chunk(values, SHAPE)
 
     def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
-        """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, one call at a time, in the thread that has
-        just computed the chunk and still has it in its cache.
+        """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just computed the chunk
+        and still has it in its cache: several of them call it at a time.
         """
         (frame, gather), valid = self._frame(vector), self.strands.valid
 
         def work(chunk: slice) -> None:
             values = self._chunk("displacement", chunk, frame)
-            with self._turn:
-                if gather is not None:
+            if gather is not None:
+                with self._turn:
                     gather(values, chunk)
-                if not valid[chunk].all():
-                    values[~valid[chunk]] = 0
-                function(chunk, values.reshape(-1, K, 3))
+            if not valid[chunk].all():
+                values[~valid[chunk]] = 0
+            function(chunk, values.reshape(-1, K, 3))
 
         self.model.by_chunk(work, len(self.strands.rest))
 

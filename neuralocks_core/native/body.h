@@ -1,21 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One body in one pose, as `near_body.PosedBody` holds it.
- *
- * Python's functions are the description, with the reasons; the C files do the same operations in the same order and precision, so
- * that both give the same bits. They must be compiled without contraction of products and sums. Nothing is allocated.
- */
+/* One body in one pose, as `near_body.PosedBody` holds it. */
 #ifndef NEURALOCKS_BODY_H
 #define NEURALOCKS_BODY_H
 
-#include <math.h>
-#include <stdint.h>
-#include <string.h>
-
-#if defined(_WIN32)
-#define PUBLIC __declspec(dllexport)
-#else
-#define PUBLIC __attribute__((visibility("default")))
-#endif
+#include "platform.h"
 
 enum { HEAD = 1, SKIN = 2 }; /* bits of marks */
 

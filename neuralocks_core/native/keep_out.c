@@ -2,7 +2,7 @@
 /* Hair kept out of a body, strand by strand: what `PosedBody.violated` and `laying.resolved` compute. */
 #include "distance.h"
 
-enum { K = 24, TRIES = 2 };
+enum { TRIES = 2 };
 
 /* Of `laying`. */
 static const float SLACK = 1e-5f;

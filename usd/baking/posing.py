@@ -10,7 +10,7 @@ from neuralocks_core.deformation.resolve import Resolver, reach
 from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.materials import Material
-from neuralocks_core.runtime import StrandModel, chunks
+from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.wind import Wind
 
@@ -84,8 +84,11 @@ class GroomPoser:
         points = moved.reshape(-1, 3) if in_place else np.empty((ends[-1], 3), np.float32)
         for placer, rows, first, end in zip(self._placers, self._rows, ends, ends[1:]):
             placed, own = placer.at(time_code, joints, points[first:end]), moved[rows]
-            for strands in chunks(len(own)):
+
+            def put(strands: slice, placed=placed, own=own) -> None:
                 placed.put(strands, own[strands].copy())
+
+            self._model.by_chunk(put, len(own))
         return points
 
     def moved(self, time_code: float) -> np.ndarray:

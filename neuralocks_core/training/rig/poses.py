@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from neuralocks_core.body.enclosed import proven_distances
-from neuralocks_core.deformation.scratch import Scratch
 from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.progress import Progress, silent
@@ -15,6 +14,7 @@ from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import cores
 from neuralocks_core.training.rig.body import BodyPatch
+from neuralocks_core.training.rig.scratch import Scratch
 
 RANGE = np.radians([60.0, 80.0, 45.0])
 """Largest nod, turn and tilt of people's heads relative to the chest [rad]."""

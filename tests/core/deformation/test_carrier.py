@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from neuralocks_core.deformation.carrier import Carrier, Placing
-from neuralocks_core.deformation.lengths import keep_lengths_of_any
+from neuralocks_core.deformation.lengths import keep_lengths
 from neuralocks_core.deformation.spans import LEFT_OVER, weights
 from neuralocks_core.deformation.turning import turned
 from neuralocks_core.groom import Groom
@@ -124,36 +124,29 @@ def test_a_bent_coil_stays_a_coil():
 
 def test_what_lies_beside_the_line_is_not_torn_where_two_segments_meet():
     """Own vertices just before and just after a network vertex at which the line is bent by 60 degrees."""
-    edges = np.tile(np.float32([[0.01], [0], [0]]), (1, 2))[:, None]
+    edges = np.tile(np.float32([0.01, 0, 0]), (1, 2, 1))
     displacement = np.zeros((1, 3, 3), np.float32)
     displacement[0, 2] = 0.01 * np.array([np.cos(np.pi / 3) - 1, np.sin(np.pi / 3), 0])
-    beside = np.tile(np.float32([[0], [0.005], [0]]), (1, 4))
-    places = np.array([0, 0, 1, 1]), np.float32([0.5, 0.999, 0.001, 0.5])
-    moved = turned(edges, displacement, *places, beside)
-    assert np.abs(moved[:, 2] - moved[:, 1]).max() < 5e-5 < 1e-3 < np.abs(moved[:, 3] - moved[:, 0]).max()
+    beside = np.tile(np.float32([0, 0.005, 0]), (1, 4, 1))
+    places = np.array([[0, 0, 1, 1]]), np.float32([[0.5, 0.999, 0.001, 0.5]])
+    moved = turned(edges, displacement, *places, beside)[0]
+    assert np.abs(moved[2] - moved[1]).max() < 5e-5 < 1e-3 < np.abs(moved[3] - moved[0]).max()
 
 
 def test_any_strand_keeps_its_lengths_and_its_root():
-    """Strands of 1 to 300 vertices, some of them doubled, in one call."""
+    """Strands of 1 to 300 vertices, some of them doubled."""
     rng = np.random.default_rng(0)
-    counts = rng.integers(1, 300, 40)
-    rest = (rng.normal(size=(counts.sum(), 3)) * 0.01).astype(np.float32)
-    rest[5] = rest[4]
-    moved = (rng.normal(size=rest.shape) * 0.02).astype(np.float32)
-    together, alone = moved.copy(), moved.copy()
-    smooth = rng.random(len(counts)) < 0.5
-    keep_lengths_of_any(rest.T, together.T, counts, smooth)
-    starts = np.cumsum(counts) - counts
-    for i, (start, count) in enumerate(zip(starts, counts)):
-        here = slice(start, start + count)
-        keep_lengths_of_any(rest[here].T, alone[here].T, counts[i : i + 1], smooth[i : i + 1])
-    assert together.tobytes() == alone.tobytes()
-    assert np.array_equal(together[starts], moved[starts])
-    inner = np.setdiff1d(np.arange(len(rest) - 1), starts[1:] - 1)
-    lengths = [
-        np.linalg.norm(np.diff(points.astype(float), axis=0), axis=1)[inner] for points in (rest, rest + together)
-    ]
-    np.testing.assert_allclose(*lengths, atol=1e-6)
+    for count in (1, 2, 3, 24, 300):
+        rest = (rng.normal(size=(8, count, 3)) * 0.01).astype(np.float32)
+        rest[5, 1:3] = rest[5, :1]
+        moved = (rng.normal(size=rest.shape) * 0.02).astype(np.float32)
+        for smooth in (False, True):
+            together = keep_lengths(rest, moved, smooth)
+            alone = [keep_lengths(rest[i : i + 1], moved[i : i + 1], smooth) for i in range(8)]
+            assert together.tobytes() == np.concatenate(alone).tobytes()
+            assert np.array_equal(together[:, 0], moved[:, 0])
+            lengths = [np.linalg.norm(np.diff(each.astype(float), axis=1), axis=2) for each in (rest, rest + together)]
+            np.testing.assert_allclose(*lengths, atol=1e-6)
 
 
 def test_hair_that_gets_its_lengths_back_keeps_its_way():
@@ -165,8 +158,7 @@ def test_hair_that_gets_its_lengths_back_keeps_its_way():
     wanted = np.concatenate([[[0, 0, 0]], np.cumsum(edges, axis=0)])
     along, off = edges / stretched[:, None], []
     for smooth in (False, True):
-        moved = (wanted - rest).astype(np.float32)
-        keep_lengths_of_any(rest.T.astype(np.float32), moved.T, np.array([count]), np.array([smooth]))
+        moved = keep_lengths(rest[None].astype(np.float32), (wanted - rest)[None].astype(np.float32), smooth)[0]
         drift = (rest + moved - wanted)[1:]
         off.append(np.linalg.norm(drift - (drift * along).sum(axis=1, keepdims=True) * along, axis=1).max())
     assert off[1] < 0.5 * off[0] and off[0] > 0.001

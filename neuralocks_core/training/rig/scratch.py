@@ -37,9 +37,3 @@ class Scratch(threading.local):
                 self._memory, self._known = memory, {}
             self._known[shapes] = arrays
         return arrays
-
-
-in_turn = Scratch()
-"""For consecutive steps of a chunk, none of which needs what another one had here: together they touch hardly more than a core's
-second-level cache holds.
-"""

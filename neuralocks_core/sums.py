@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sums of a few terms from the first to the last: numpy's own order depends on the machine, and compiled code is to give the same
+bits.
+"""
+
+import numpy as np
+
+
+def in_order(terms: np.ndarray) -> np.ndarray:
+    """Sums (...) over the last axis of terms (..., k)."""
+    total = terms[..., 0].copy()
+    for i in range(1, terms.shape[-1]):
+        total += terms[..., i]
+    return total
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (...) of vectors (..., k)."""
+    return in_order(a * b)
