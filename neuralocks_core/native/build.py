@@ -23,7 +23,7 @@ TARGETS = {
 SOURCES = sorted(file for ending in "ch" for file in FOLDER.parent.glob(f"*.{ending}"))
 MADE = FOLDER / "made_from.txt"
 # Products and sums are not contracted: that would round differently from numpy.
-FLAGS = "-std=c99 -O2 -ffp-contract=off -fno-math-errno -fvisibility=hidden -fPIC -shared -s -Wall -Wextra -Werror -pedantic".split()
+FLAGS = "-std=c99 -O2 -ffp-contract=off -fno-math-errno -fvisibility=hidden -fPIC -shared -s -nostdlib -Wall -Wextra -Werror -pedantic".split()
 
 
 def main() -> None:

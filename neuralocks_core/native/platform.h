@@ -7,9 +7,17 @@
 #ifndef NEURALOCKS_PLATFORM_H
 #define NEURALOCKS_PLATFORM_H
 
-#include <math.h>
 #include <stdint.h>
-#include <string.h>
+
+/* The compilers' own, so that the library needs no other. */
+#define sqrt __builtin_sqrt
+#define sqrtf __builtin_sqrtf
+#define fabsf __builtin_fabsf
+#define isinf __builtin_isinf
+#define isfinite __builtin_isfinite
+#define INFINITY __builtin_inff()
+#define memcpy __builtin_memcpy
+#define memset __builtin_memset
 
 #if defined(_WIN32)
 #define PUBLIC __declspec(dllexport)
