@@ -82,12 +82,12 @@ def test_what_is_named_exists(document):
     for code in re.findall(r"`([^`\n]+)`", text):
         missing += [
             name
-            for name in re.findall(r"[\w/]+\.(?:py|h\.in|c\.in|md|png|gif)\b", code)
+            for name in re.findall(r"[\w/]+\.(?:py|h\.in|c\.in|c|md|png|gif)\b", code)
             if not any(file == name or file.endswith(f"/{name}") for file in (*FILES, "README.md", "CREDITS.md"))
         ]
         for dotted in re.findall(r"(?<![\w./])[a-z_]+(?:\.[A-Za-z_]\w*)+\b(?!/)", code):
             first, then = dotted.split(".")[:2]
-            if first in known and then not in known[first] and then not in ("py", "json"):
+            if first in known and then not in known[first] and then not in ("py", "json", "c"):
                 missing.append(dotted)
         for owner, field in re.findall(r"(?<![\w./])([A-Z]\w*)\.([A-Za-z_]\w*)", code):
             if owner in classes() and field not in classes()[owner]:
