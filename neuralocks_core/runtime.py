@@ -7,7 +7,7 @@ chunk per core at a time.
 """
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
@@ -186,10 +186,6 @@ class StrandModel:
             wait(others)
         for other in others:
             other.result()
-
-    def map(self, function: Callable, items) -> Iterable:
-        """Results of calls on this model's threads, in order; a single call runs in the caller's thread."""
-        return map(function, items) if len(items) < 2 else self._pool.map(function, items)
 
 
 def cores() -> int:

@@ -124,7 +124,7 @@ class LiveHair:
             self._resolver = Resolver(self.character, self._skin.begun(self._strands), self._clip)
 
         def push(moved: np.ndarray) -> None:
-            self._resolver.apply(moved, joints, shape, self.model.map)
+            self._resolver.apply(moved, joints, shape, self.model.by_chunk)
 
         self._skin.carry(result, shape, push if resolve else None)
         return result

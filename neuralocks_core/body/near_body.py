@@ -112,12 +112,10 @@ class PosedBody:
         return KeepOut(fields)
 
     def violated(self, points: np.ndarray, low: np.ndarray) -> np.ndarray:
-        """Numbers of the strands (n,) of points (S, K, 3) float32 with a vertex nearer than `low` (S, K) [m]."""
-        compiled = self.compiled(points.shape[1])
-        return self._violated(points, low) if compiled is None else compiled.violated(points, low)
+        """Numbers of the strands (n,) of points (S, K, 3) float32 with a vertex nearer than `low` (S, K) [m].
 
-    def _violated(self, points: np.ndarray, low: np.ndarray) -> np.ndarray:
-        """What `keep_out.c` computes. One lookup in a grid clears most vertices."""
+        One lookup in a grid clears most vertices.
+        """
         each = points.shape[1]
         cells = self._near.box.cells(points).ravel()
         marks = self._marks.take(cells)

@@ -23,6 +23,30 @@ STEEP = 0.003
 """How much more than its length a segment may seem to go down [m]: the largest error of distances."""
 
 
+NEVER, CHECKED, ALWAYS = 0, 1, 2
+"""Whether a strand is laid: not at all, if a vertex is nearer than it may be, or without asking."""
+
+
+def keep_out(displacement: np.ndarray, rest: np.ndarray, clear: np.ndarray, watch: np.ndarray, body: PosedBody) -> None:
+    """Lay strands over the body where they are inside it.
+
+    Args:
+        displacement: (S, K, 3) float32 [m] from rest, changed in place.
+        rest: (S, K, 3) float32 [m], in the body's space.
+        clear: distance (S, K) float32 [m] that each vertex must keep, -inf for those that never move.
+        watch: (S,) uint8, NEVER, CHECKED or ALWAYS.
+        body: in this pose.
+    """
+    compiled = body.compiled(rest.shape[1])
+    if compiled is not None and displacement.flags.c_contiguous:
+        compiled.keep_out(displacement, rest, clear, watch)
+        return
+    laid = watch == ALWAYS
+    laid[body.violated(rest + displacement, clear - SLACK)] = True
+    rows = np.flatnonzero(laid & (watch != NEVER))
+    displacement[rows] = resolved(rest[rows] + displacement[rows], body, clear[rows]) - rest[rows]
+
+
 def resolved(points: np.ndarray, body: PosedBody, clear: np.ndarray) -> np.ndarray:
     """Strands laid over the surface where they were inside it.
 

@@ -11,7 +11,16 @@ from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.enclosed import enclosed
 from neuralocks_core.body.near_body import NearBody, PosedBody
 from neuralocks_core.character import Character
-from neuralocks_core.deformation.laying import MARGIN, SLACK, clearance, resolved, rest_distance
+from neuralocks_core.deformation.laying import (
+    ALWAYS,
+    CHECKED,
+    MARGIN,
+    NEVER,
+    clearance,
+    keep_out,
+    resolved,
+    rest_distance,
+)
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.skinned_body import Body
@@ -26,7 +35,7 @@ STEP, ROOM = 0.1, 0.1
 DEEP = 0.02
 """A strand that rests deeper than this [m] is checked in every frame: its next vertices may lie where nothing is known."""
 BATCH = 1024
-"""Strands checked and pushed together."""
+"""Strands checked and pushed together, without threads."""
 WORN = 0.01
 """A root deeper in the body than this [m] is not on its skin, but under something worn."""
 
@@ -96,7 +105,11 @@ class Resolver:
             _ = self.clear
 
     def apply(
-        self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None = None, each: Callable = map
+        self,
+        displacement: np.ndarray,
+        joints: np.ndarray,
+        shape: np.ndarray | None = None,
+        by_chunk: Callable | None = None,
     ) -> None:
         """Change the network's displacement (S, 24, 3) float32 [m] for a pose where it leaves hair inside the body.
 
@@ -104,7 +117,8 @@ class Resolver:
             displacement: canonical, changed in place.
             joints: world joint transforms (J, 4, 4).
             shape: blend shape weights (B,).
-            each: like `map`, possibly on several threads; the result does not depend on them.
+            by_chunk: calls a function with slices of so many strands, possibly on several threads, such as `StrandModel.by_chunk`;
+                the result does not depend on them.
 
         Raises:
             NeuralocksError: an array has the wrong shape.
@@ -119,7 +133,7 @@ class Resolver:
                 raise NeuralocksError(f"{name}: is of shape {np.shape(array)}; give {wanted}")
         if self._size != 1:
             displacement /= self._size
-        self._push(displacement, joints, shape, each)
+        self._push(displacement, joints, shape, by_chunk or _one_by_one)
         if self._size != 1:
             displacement *= self._size
 
@@ -151,20 +165,10 @@ class Resolver:
         truly[deep] = enclosed(places, vertices, self.character.body.triangles)
         return truly
 
-    def _push(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None, each: Callable) -> None:
-        rest, clear = self._rest, self.clear
-        parts = [slice(i, min(i + BATCH, len(rest))) for i in range(0, len(rest), BATCH)]
-        edges = np.array(list(each(lambda s: _corners(rest[s] + displacement[s]), parts)))
-        body = self._posed(joints, shape, edges[:, 0].min(axis=0), edges[:, 1].max(axis=0))
-
-        def push(s: slice) -> None:
-            hit = self._always[s].copy()
-            hit[body.violated(rest[s] + displacement[s], clear[s] - SLACK)] = True
-            rows = s.start + np.flatnonzero(hit & self.strands.valid[s])
-            displacement[rows] = resolved(rest[rows] + displacement[rows], body, clear[rows]) - rest[rows]
-
-        for _ in each(push, parts):
-            pass
+    def _push(self, displacement: np.ndarray, joints: np.ndarray, shape: np.ndarray | None, by_chunk: Callable) -> None:
+        rest, clear, watch = self._rest, self.clear, self._watch
+        body = self._posed(joints, shape, *_within(self._reach + _reached(displacement)))
+        by_chunk(lambda s: keep_out(displacement[s], rest[s], clear[s], watch[s], body), len(rest))
 
     def _posed(self, joints, shape, low, high) -> PosedBody:
         changed = None if shape is None else np.asarray(shape, float) - self._constant
@@ -184,13 +188,18 @@ class Resolver:
     def _rested(self) -> tuple[PosedBody, np.ndarray]:
         """The body in bind pose, and each vertex's signed distance to it there (S, 24) [m], at a person's size."""
         points = self._rest
-        body = self._posed(self.character.skeleton.bind, self._constant, *_corners(points))
+        body = self._posed(self.character.skeleton.bind, self._constant, *_within(_reached(points)))
         parts = [rest_distance(points[i : i + BATCH], body) for i in range(0, len(points), BATCH)]
         return body, np.concatenate(parts)
 
     @cached_property
-    def _always(self) -> np.ndarray:
-        return (self.clear[:, CLAMPED:] < -DEEP).any(axis=1)
+    def _watch(self) -> np.ndarray:
+        deep = (self.clear[:, CLAMPED:] < -DEEP).any(axis=1)
+        return np.where(self.strands.valid, np.where(deep, ALWAYS, CHECKED), NEVER).astype(np.uint8)
+
+    @cached_property
+    def _reach(self) -> np.ndarray:
+        return _reached(self._rest)
 
     def serves(self, clip: Clip) -> bool:
         """Whether a resolver made for this clip would give the same results."""
@@ -218,11 +227,20 @@ class Resolver:
         return self._clip.shape[0]
 
 
-def _corners(points: np.ndarray) -> np.ndarray:
-    """Low and high corner (2, 3) of points (S, K, 3)."""
-    # Along the strands first: comparing rows of numbers is much faster than comparing triples.
-    rows = points.reshape(len(points), -1)
-    return np.stack([rows.min(axis=0).reshape(-1, 3).min(axis=0), rows.max(axis=0).reshape(-1, 3).max(axis=0)])
+def _reached(points: np.ndarray) -> np.ndarray:
+    """Least and greatest coordinates (2, K, 3) of each vertex of strands (S, K, 3)."""
+    rows = points.reshape(len(points), -1)  # comparing rows of numbers is much faster than comparing triples
+    return np.stack([rows.min(axis=0), rows.max(axis=0)]).reshape(2, -1, 3)
+
+
+def _within(reached: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Low and high corner (3,) of all vertices, from those of each (2, K, 3)."""
+    return reached[0].min(axis=0), reached[1].max(axis=0)
+
+
+def _one_by_one(function: Callable[[slice], None], count: int) -> None:
+    for i in range(0, count, BATCH):
+        function(slice(i, min(i + BATCH, count)))
 
 
 def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:

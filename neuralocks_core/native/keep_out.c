@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Hair kept out of a body, strand by strand: what `PosedBody.violated` and `laying.resolved` compute. */
+/* Hair kept out of a body, strand by strand: what `laying.keep_out` and `laying.resolved` compute. */
 #include "distance.h"
 
-enum { TRIES = 2 };
+enum { TRIES = 2, NEVER = 0, ALWAYS = 2 };
 
 /* Of `laying`. */
 static const float SLACK = 1e-5f;
@@ -126,40 +126,47 @@ static int lay_vertex(const Body *body, double wanted[K][3], const float keep[K]
     return open;
 }
 
-/* Which strands (n) of points (n, 24, 3) have a vertex nearer to the body than `low` (n, 24). */
-PUBLIC void neuralocks_violated(const Body *body, const float *points, const float *low, int64_t n, uint8_t *out) {
-    for (int64_t s = 0; s < n; s++) {
-        out[s] = 0;
-        for (int i = 0; i < K && !out[s]; i++) out[s] = (uint8_t)too_near(body, points + (s * K + i) * 3, low[s * K + i]);
+/* One strand of laying.resolved, in place. */
+static void lay(const Body *body, float points[K][3], const float keep[K]) {
+    double wanted[K][3], result[K][3], lack = -INFINITY;
+    Plane planes[K];
+    int first = K, moved = 0, hard = 0;
+    for (int i = 0; i < K; i++)
+        for (int x = 0; x < 3; x++) wanted[i][x] = points[i][x];
+    measure(body, wanted, planes);
+    for (int i = 0; i < K; i++) {
+        lack = most_of(lack, keep[i] - planes[i].height);
+        if (first == K && keep[i] - planes[i].height > SLACK) first = i;
     }
+    if (first == K) return;
+    memcpy(result, wanted, sizeof result);
+    for (int i = first > 0 ? first : 1; i < K; i++) hard |= lay_vertex(body, wanted, keep, planes, result, i, &moved);
+    if (hard) {
+        double left = -INFINITY;
+        measure(body, result, planes);
+        for (int i = 0; i < K; i++) left = most_of(left, keep[i] - planes[i].height);
+        if (left > most_of(lack, 0.5 * MARGIN)) return;
+    }
+    for (int i = 0; i < K; i++)
+        for (int x = 0; x < 3; x++) points[i][x] = (float)result[i][x];
 }
 
-/* Strands (n, 24, 3) laid over the body where they are inside it, in place; `keep` (n, 24) is the distance that each vertex keeps. */
-PUBLIC void neuralocks_lay(const Body *body, float *strands, const float *keep_all, int64_t n) {
-    double wanted[K][3], result[K][3];
-    Plane planes[K];
-    for (int64_t s = 0; s < n; s++) {
-        float *points = strands + s * K * 3;
-        const float *keep = keep_all + s * K;
-        for (int i = 0; i < K; i++)
-            for (int x = 0; x < 3; x++) wanted[i][x] = points[3 * i + x];
-        measure(body, wanted, planes);
-        double lack = -INFINITY;
-        int first = K, moved = 0, hard = 0;
-        for (int i = 0; i < K; i++) {
-            lack = most_of(lack, keep[i] - planes[i].height);
-            if (first == K && keep[i] - planes[i].height > SLACK) first = i;
-        }
-        if (first == K) continue;
-        memcpy(result, wanted, sizeof result);
-        for (int i = first > 0 ? first : 1; i < K; i++) hard |= lay_vertex(body, wanted, keep, planes, result, i, &moved);
-        if (hard) {
-            double left = -INFINITY;
-            measure(body, result, planes);
-            for (int i = 0; i < K; i++) left = most_of(left, keep[i] - planes[i].height);
-            if (left > most_of(lack, 0.5 * MARGIN)) continue;
-        }
-        for (int i = 0; i < K; i++)
-            for (int x = 0; x < 3; x++) points[3 * i + x] = (float)result[i][x];
+/* laying.resolved: strands (n, K, 3), in place; `keep` (n, K) */
+PUBLIC void neuralocks_lay(const Body *body, float *strands, const float *keep, int64_t n) {
+    for (int64_t s = 0; s < n; s++) lay(body, (float(*)[3])(strands + s * K * 3), keep + s * K);
+}
+
+/* laying.keep_out: displacement (n, K, 3), in place; `watch` (n): NEVER, CHECKED or ALWAYS */
+PUBLIC void neuralocks_keep_out(const Body *body, const float *rest, float *displacement, const float *keep, const uint8_t *watch,
+                                int64_t n) {
+    for (int64_t s = 0; s < n; s++, rest += K * 3, displacement += K * 3, keep += K) {
+        float points[K][3];
+        if (watch[s] == NEVER) continue;
+        for (int i = 0; i < K * 3; i++) points[i / 3][i % 3] = rest[i] + displacement[i];
+        int hit = watch[s] == ALWAYS;
+        for (int i = 0; i < K && !hit; i++) hit = too_near(body, points[i], keep[i] - SLACK);
+        if (!hit) continue;
+        lay(body, points, keep);
+        for (int i = 0; i < K * 3; i++) displacement[i] = points[i / 3][i % 3] - rest[i];
     }
 }

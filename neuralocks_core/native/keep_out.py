@@ -29,12 +29,11 @@ class KeepOut:
         """Whether there is compiled code for this machine, strands of so many vertices, and skin of so many neighbours."""
         return vertices == VERTICES and neighbours <= MOST_NEIGHBOURS and library() is not None
 
-    def violated(self, points: np.ndarray, low: np.ndarray) -> np.ndarray:
-        """As `PosedBody.violated`."""
-        points, low = (np.ascontiguousarray(each, np.float32) for each in (points, low))
-        out = np.empty(len(points), np.uint8)
-        library().neuralocks_violated(ctypes.byref(self._body), at(points), at(low), c_int64(len(points)), at(out))
-        return np.flatnonzero(out)
+    def keep_out(self, displacement, rest, keep, watch) -> None:
+        """As `laying.keep_out`; the displacement must be contiguous."""
+        rest, keep = (np.ascontiguousarray(each, np.float32) for each in (rest, keep))
+        arrays = map(at, (rest, displacement, keep, np.ascontiguousarray(watch)))
+        library().neuralocks_keep_out(ctypes.byref(self._body), *arrays, c_int64(len(rest)))
 
     def laid(self, points: np.ndarray, keep: np.ndarray) -> np.ndarray:
         """As `laying.resolved`."""

@@ -31,7 +31,7 @@ def library() -> ctypes.CDLL | None:
         return None
     if found.neuralocks_layout() != 1000 * LAYOUT + ctypes.sizeof(Body):
         return None
-    for name in ("violated", "lay", "pose_skin", "carry"):
+    for name in ("keep_out", "lay", "pose_skin", "carry"):
         getattr(found, f"neuralocks_{name}").restype = None
     return found
 

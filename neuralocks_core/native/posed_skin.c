@@ -29,7 +29,7 @@ PUBLIC int32_t neuralocks_layout(void) { return 1000 + (int32_t)sizeof(Body); }
 
 /* Planes (n, 6) of samples on triangles (n, 3) of points (V, 3), at `part` (n, 2) of each, and the grid's `start` and `marks` (cells).
  *
- * box, cell: the grid, and the width of its cells; low, high: where samples must lie to be entered; own: (n), for use here.
+ * box, cell: the grid, and the width of its cells; low, high: where samples must lie to be entered; own: (2, n), for use here.
  */
 PUBLIC void neuralocks_pose_skin(const Box *box, double cell, const float low[3], const float high[3], const float *points,
                                  const int32_t *corners, const float *part, int64_t n, int32_t *own, float *planes, int32_t *start,
@@ -56,16 +56,20 @@ PUBLIC void neuralocks_pose_skin(const Box *box, double cell, const float low[3]
     /* Around them, of samples in one cell the last one stands for all. */
     for (int64_t i = 0; i < n; i++)
         if (own[i] >= 0) start[own[i]] = (int32_t)i;
+    int64_t left = 0;
+    int32_t *sample = own + n;
     for (int64_t i = 0; i < n; i++)
-        if (own[i] >= 0 && start[own[i]] != (int32_t)i) own[i] = -1;
+        if (own[i] >= 0 && start[own[i]] == (int32_t)i) {
+            own[left] = own[i];
+            sample[left++] = (int32_t)i;
+        }
     for (int far = 3; far >= 0; far--)
         for (int32_t step = 0; step < 27; step++) {
             const int32_t x = step / 9 - 1, y = step / 3 % 3 - 1, z = step % 3 - 1;
             if (x * x + y * y + z * z != far) continue;
             const int32_t on = x * box->strides[0] + y * box->strides[1] + z * box->strides[2];
-            for (int64_t i = 0; i < n; i++) {
-                if (own[i] < 0) continue;
-                start[own[i] + on] = (int32_t)i;
+            for (int64_t i = 0; i < left; i++) {
+                start[own[i] + on] = sample[i];
                 marks[own[i] + on] |= SKIN;
             }
         }

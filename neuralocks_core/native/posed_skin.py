@@ -22,7 +22,7 @@ def pose_skin(box, low, high, points, corners, part, marks) -> tuple[np.ndarray,
         marks: of the cells (box.count,) uint8, changed.
     """
     points, count = np.ascontiguousarray(points, np.float32), len(corners)
-    planes, start, own = np.empty((count, 6), np.float32), np.empty(box.count, np.int32), np.empty(count, np.int32)
+    planes, start, own = np.empty((count, 6), np.float32), np.empty(box.count, np.int32), np.empty((2, count), np.int32)
     library().neuralocks_pose_skin(
         ctypes.byref(Box.of(box)), c_double(box.cell), *map(at, (low, high, points, corners, part)),
         c_int64(count), *map(at, (own, planes, start, marks)),

@@ -107,7 +107,7 @@ class GroomPoser:
         """Push displaced strands out of the body, in place."""
         for rows, resolver in self._resolvers:
             part = moved[rows]
-            resolver.apply(part, joints, shape, self._model.map)
+            resolver.apply(part, joints, shape, self._model.by_chunk)
             if not isinstance(rows, slice):  # a slice gives a view
                 moved[rows] = part
 

@@ -38,7 +38,7 @@ def test_anyone_who_compiles_the_sources_gets_the_same_bytes(compiler, tmp_path,
 def test_each_is_a_library_for_its_system_with_all_functions(target):
     held = file_for(target).read_bytes()
     assert held.startswith(BEGIN[target.split("-")[0]]) and len(held) < 200_000
-    assert all(f"neuralocks_{name}\0".encode() in held for name in ("layout", "violated", "lay", "pose_skin", "carry"))
+    assert all(f"neuralocks_{name}\0".encode() in held for name in ("layout", "keep_out", "lay", "pose_skin", "carry"))
 
 
 def test_numbers_in_c_are_those_in_python():

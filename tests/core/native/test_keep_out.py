@@ -51,16 +51,21 @@ def hair(count=600):
 
 def test_strands_are_laid_the_same(near, monkeypatch):
     points, clear = hair()
-    body = posed(near)
-    assert body.compiled(24) is not None
-    found, hit = laying.resolved(points, body, clear), body.violated(points, clear)
+    rest, watch = np.float32(0.9) * points, (np.arange(len(points)) % 5).clip(max=2).astype(np.uint8)
+
+    def kept():
+        displacement, body = points - rest, posed(near)
+        laying.keep_out(displacement, rest, clear, watch, body)
+        return body.compiled(24) is not None, laying.resolved(points, body, clear), displacement
+
+    compiled, found, displaced = kept()
     without(monkeypatch)
-    body = posed(near)
-    assert body.compiled(24) is None
+    plain, wanted, wanted_displaced = kept()
     moved = (found != points).any(axis=(1, 2))
-    assert moved.sum() > 500 and not moved.all() and np.isfinite(found).all()
-    assert found.tobytes() == laying.resolved(points, body, clear).tobytes()
-    np.testing.assert_array_equal(hit, body.violated(points, clear))
+    assert compiled and not plain and moved.sum() > 500 and not moved.all() and np.isfinite(found).all()
+    assert found.tobytes() == wanted.tobytes() and displaced.tobytes() == wanted_displaced.tobytes()
+    changed = (displaced != points - rest).any(axis=(1, 2))
+    assert changed[watch == laying.CHECKED].any() and not changed[watch == laying.NEVER].any()
 
 
 def test_skin_is_posed_the_same(near, monkeypatch):
@@ -80,7 +85,9 @@ def test_points_that_are_nowhere_near_are_left(near):
     points, clear = hair(20)
     for far in (1e6, 1e30, np.inf, np.nan):
         away = np.full_like(points, far)
-        assert not len(posed(near).violated(away, clear))
+        moved = away.copy()
+        laying.keep_out(moved, points, clear, np.ones(len(points), np.uint8), posed(near))
+        np.testing.assert_array_equal(moved, away)
         np.testing.assert_array_equal(laying.resolved(away, posed(near), clear), away)
 
 
