@@ -10,7 +10,7 @@ from pathlib import Path
 from neuralocks_core.native.body import Body
 
 LAYOUT = 1
-"""Changes with the interface; the C file has it too."""
+"""Changes with the interface; `posed_skin.c` has it too."""
 FOLDER = Path(__file__).resolve().parent / "libraries"
 ENDINGS = {"linux": "so", "windows": "dll", "macos": "dylib"}
 SYSTEMS = {"linux": "linux", "win32": "windows", "darwin": "macos"}
@@ -27,13 +27,12 @@ def library() -> ctypes.CDLL | None:
         return None
     try:
         found = ctypes.CDLL(str(file_for(f"{system}-{machine}")))
-    except OSError:
+        fits = found.neuralocks_layout() == 1000 * LAYOUT + ctypes.sizeof(Body)
+        for name in ("keep_out", "lay", "pose_skin", "carry"):
+            getattr(found, f"neuralocks_{name}").restype = None
+    except (OSError, AttributeError):  # it does not load, or is another library
         return None
-    if found.neuralocks_layout() != 1000 * LAYOUT + ctypes.sizeof(Body):
-        return None
-    for name in ("keep_out", "lay", "pose_skin", "carry"):
-        getattr(found, f"neuralocks_{name}").restype = None
-    return found
+    return found if fits else None
 
 
 def file_for(target: str) -> Path:

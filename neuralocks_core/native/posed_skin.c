@@ -2,7 +2,7 @@
 /* Samples of moving skin posed and entered in a grid: what `moving_skin.PosedSkin` does when it is made. */
 #include "body.h"
 
-enum { DEPTH = 3 };
+enum { DEPTH = 3, LAYOUT = 1 };
 
 /* Skin.planes, of one sample */
 static void pose(const float *points, const int32_t corners[3], const float part[2], float plane[6]) {
@@ -25,7 +25,7 @@ static void pose(const float *points, const int32_t corners[3], const float part
 }
 
 /* A number that changes with this library's interface, for whoever loads it to compare. */
-PUBLIC int32_t neuralocks_layout(void) { return 1000 + (int32_t)sizeof(Body); }
+PUBLIC int32_t neuralocks_layout(void) { return 1000 * LAYOUT + (int32_t)sizeof(Body); }
 
 /* Planes (n, 6) of samples on triangles (n, 3) of points (V, 3), at `part` (n, 2) of each, and the grid's `start` and `marks` (cells).
  *

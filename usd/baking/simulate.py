@@ -3,7 +3,6 @@
 
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -15,7 +14,6 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.comparison import BLOWN, RUN_IN, simulated
 from neuralocks_core.files import as_path
 from neuralocks_core.progress import Progress
-from neuralocks_core.runtime import cores
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
@@ -132,6 +130,5 @@ class _SimulatedPoser:
     def _push(self, moved: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> None:
         """Push the following strands out of the body, in place: the solver kept only the strands that they follow out of it."""
         followed = moved[self._others]
-        with ThreadPoolExecutor(cores()) as pool:
-            self._resolver.apply(followed, joints, shape, pool.map)
+        self._resolver.apply(followed, joints, shape)
         moved[self._others] = followed
