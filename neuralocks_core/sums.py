@@ -17,3 +17,8 @@ def in_order(terms: np.ndarray) -> np.ndarray:
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Products (...) of vectors (..., k)."""
     return in_order(a * b)
+
+
+def times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """A matrix (k, k) times vectors (..., k)."""
+    return in_order(vectors[..., None, :] * matrix)

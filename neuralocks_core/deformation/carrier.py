@@ -10,7 +10,7 @@ import numpy as np
 from neuralocks_core.deformation.following import Following
 from neuralocks_core.native.carry import Carry
 from neuralocks_core.strands.arclength import arc_lengths
-from neuralocks_core.sums import in_order
+from neuralocks_core.sums import times
 
 if TYPE_CHECKING:
     from neuralocks_core.groom import Groom
@@ -121,17 +121,12 @@ class Carrier:
         else:
             moved = self._following.moved(displacement, start, points)
         if onto is None:
-            out[:] = _times(placing.linear, (points - placing.centre) + moved) + placing.origin
+            out[:] = times(placing.linear, (points - placing.centre) + moved) + placing.origin
             return
         if placing is not None:
-            moved = _times(placing.linear, moved)
+            moved = times(placing.linear, moved)
         out[:] = np.where(moved == 0, onto, onto + moved)  # -0 + 0 would be +0
 
     def _in_bind_axes(self, vectors: np.ndarray) -> np.ndarray:
         # The inverse of a rotation: rows times R are columns times its transpose.
-        return _times(self._facing.T, vectors)
-
-
-def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """A matrix (3, 3) times vectors (..., 3)."""
-    return in_order(vectors[..., None, :] * matrix)
+        return times(self._facing.T, vectors)

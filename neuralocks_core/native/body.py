@@ -9,8 +9,8 @@ from ctypes import c_float, c_int32, c_void_p
 
 import numpy as np
 
-MOST_NEIGHBOURS = 8
-"""Of a sample of skin: the size of arrays in C."""
+VERTICES, MOST_NEIGHBOURS = 24, 8
+"""Of a strand, and of a sample of skin: sizes of arrays in C."""
 
 
 class Box(ctypes.Structure):

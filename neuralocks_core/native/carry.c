@@ -120,7 +120,7 @@ static void keep_lengths(const float *points, int64_t count, int smooth, float *
     }
 }
 
-/* carrier._placed */
+/* The end of Carrier._carried */
 static void place(const Placing *placing, const float *points, const float *onto, const float *moved, int64_t count, float *out) {
     for (int64_t p = 0; p < 3 * count; p += 3) {
         float by[3];

@@ -7,11 +7,9 @@ from ctypes import c_int64, c_void_p
 
 import numpy as np
 
-from neuralocks_core.native.body import at
+from neuralocks_core.native.body import VERTICES, at
 from neuralocks_core.native.library import library
 
-VERTICES = 24
-"""Of the network, on a strand: the size of arrays in C."""
 TYPES = {
     "ends": np.int64, "points": np.float32, "still": np.bool_, "facing": np.float32, "first": np.uint8, "weights": np.float32,
     "coil": np.int32, "edges": np.float32, "begin": np.int64, "segment": np.uint8, "share": np.float32, "beside": np.float32,

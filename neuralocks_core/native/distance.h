@@ -33,14 +33,14 @@ static int head_distance(const Body *body, const float point[3], float *value, f
     Corner corner;
     if (!corner_of(body, point, &corner)) return 0;
     const int32_t along_x = body->head_size[1] * body->head_size[2], along_y = body->head_size[2];
-    double part[3], flat[2][2], rise[2][2], line[2], slope_y[2];
+    double part[3], flat[2][2], line[2], slope_y[2];
+    float rise[2][2];
     for (int x = 0; x < 3; x++) part[x] = (double)corner.place[x] - (double)corner.node[x];
     for (int i = 0; i < 2; i++) {
         for (int j = 0; j < 2; j++) {
             const float *at = body->head_values + corner.low + i * along_x + j * along_y;
-            float up = at[1] - at[0];
-            rise[i][j] = up;
-            flat[i][j] = at[0] + part[2] * up;
+            rise[i][j] = at[1] - at[0];
+            flat[i][j] = at[0] + part[2] * rise[i][j];
         }
         slope_y[i] = flat[i][1] - flat[i][0];
         line[i] = flat[i][0] + part[1] * slope_y[i];
@@ -48,11 +48,7 @@ static int head_distance(const Body *body, const float point[3], float *value, f
     double slope[3] = {line[1] - line[0], 0, 0}, rise_z[2];
     double mixed = line[0] + part[0] * slope[0];
     if (!isfinite(mixed)) return 0;
-    for (int i = 0; i < 2; i++) {
-        /* In numpy the difference of two float32 is one, too. */
-        float off = (float)rise[i][1] - (float)rise[i][0];
-        rise_z[i] = rise[i][0] + part[1] * off;
-    }
+    for (int i = 0; i < 2; i++) rise_z[i] = rise[i][0] + part[1] * (rise[i][1] - rise[i][0]);
     slope[1] = slope_y[0] + part[0] * (slope_y[1] - slope_y[0]);
     slope[2] = rise_z[0] + part[0] * (rise_z[1] - rise_z[0]);
     double length = sqrt(slope[0] * slope[0] + slope[1] * slope[1] + slope[2] * slope[2]);

@@ -7,11 +7,8 @@ from ctypes import c_int64
 
 import numpy as np
 
-from neuralocks_core.native.body import MOST_NEIGHBOURS, at, filled
+from neuralocks_core.native.body import MOST_NEIGHBOURS, VERTICES, at, filled
 from neuralocks_core.native.library import library
-
-VERTICES = 24
-"""Of a strand: the size of arrays in C."""
 
 
 class KeepOut:

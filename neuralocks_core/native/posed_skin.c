@@ -4,7 +4,7 @@
 
 enum { DEPTH = 3, LAYOUT = 1 };
 
-/* Skin.planes, of one sample */
+/* moving_skin._planes, of one sample */
 static void pose(const float *points, const int32_t corners[3], const float part[2], float plane[6]) {
     const float *a = points + 3 * (int64_t)corners[0];
     float b[3], c[3], *normal = plane + 3;

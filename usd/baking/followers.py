@@ -3,6 +3,8 @@
 
 import numpy as np
 
+from neuralocks_core.sums import times
+
 from ..shot.curve_ends import Beyond
 
 SHORT = 0.01
@@ -28,7 +30,7 @@ class Followers:
         # The edge that each point extends, as indices of drawn points.
         self._near, self._far = number[self._own + inward], number[self._own + 2 * inward]
         near, far = points[self._own + inward].astype(float), points[self._own + 2 * inward].astype(float)
-        self._offset, self._edge = _times(linear, points[self._own] - near), _times(linear, far - near)
+        self._offset, self._edge = times(linear, points[self._own] - near), times(linear, far - near)
 
     def put(self, drawn: np.ndarray, first: int, linear: np.ndarray, rest: np.ndarray | None, into: np.ndarray) -> None:
         """Fill in the points of some consecutive strands.
@@ -44,9 +46,9 @@ class Followers:
         into[self._hair[first : first + len(drawn)]] = drawn
         some = slice(*np.searchsorted(self._near, [first, first + len(drawn)]))
         own, near, far = self._own[some], self._near[some] - first, self._far[some] - first
-        offset = _times(linear, self._offset[some])
+        offset = times(linear, self._offset[some])
         edge = drawn[far].astype(float) - drawn[near]
-        into[own] = drawn[near] + _turned(offset, _times(linear, self._edge[some]), edge)
+        into[own] = drawn[near] + _turned(offset, times(linear, self._edge[some]), edge)
         if rest is not None:
             still = (drawn[[near, far]] == rest[self._hair[[self._near[some], self._far[some]]]]).all(axis=(0, 2))
             into[own[still]] = rest[own[still]]
@@ -67,8 +69,3 @@ def _turned(vectors: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.nd
 
 def _length(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.sum(vectors * vectors, axis=-1, keepdims=True))
-
-
-def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """A matrix (3, 3) times vectors (n, 3)."""
-    return sum(vectors[:, [k]] * matrix[:, k] for k in range(3))

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compiled libraries in the repository are those of the sources beside them."""
 
+import re
+
 import numpy as np
 import pytest
 
 from neuralocks_core.body import moving_skin, near_body
-from neuralocks_core.deformation import laying
-from neuralocks_core.native import build
+from neuralocks_core.deformation import laying, lengths, spans
+from neuralocks_core.native import build, library
+from neuralocks_core.native.body import MOST_NEIGHBOURS, VERTICES
 from neuralocks_core.native.library import FOLDER, file_for
+from neuralocks_core.network_sizes import K
 
 BEGIN = {"linux": b"\x7fELF", "windows": b"MZ", "macos": b"\xcf\xfa\xed\xfe"}
 
@@ -41,25 +45,25 @@ def test_each_is_a_library_for_its_system_with_all_functions(target):
     assert all(f"neuralocks_{name}\0".encode() in held for name in ("layout", "keep_out", "lay", "pose_skin", "carry"))
 
 
-def test_numbers_in_c_are_those_in_python():
+NUMBERS = {
+    moving_skin: ("REACH", "BESIDE", "THIN", "DEPTH", "SKIN"),
+    near_body: ("HEAD", "CURVED"),
+    laying: ("SLACK", "MARGIN", "FLAT", "BACK", "UNSEEN", "STEEP", "TRIES", "NEVER", "ALWAYS"),
+    lengths: ("TINY",),
+    spans: ("NODES",),
+    library: ("LAYOUT",),
+}
+
+
+@pytest.mark.parametrize("module", NUMBERS)
+def test_numbers_in_c_are_those_in_python(module):
     sources = "".join(file.read_text(encoding="utf-8") for file in build.SOURCES)
-    for module in (moving_skin, near_body, laying):
-        for name in (
-            "REACH",
-            "BESIDE",
-            "THIN",
-            "CURVED",
-            "SLACK",
-            "MARGIN",
-            "FLAT",
-            "BACK",
-            "UNSEEN",
-            "STEEP",
-            "TRIES",
-            "DEPTH",
-            "SKIN",
-            "HEAD",
-        ):
-            if name in vars(module):
-                given = sources.split(f" {name} = ")[1].split(",")[0].split(";")[0].split("}")[0].strip(" f")
-                assert np.float32(given) == np.float32(getattr(module, name)), name
+    for name in NUMBERS[module]:
+        (given,) = re.findall(rf"\b{name} = ([-\d.e]+)", sources)
+        assert np.float32(given) == np.float32(getattr(module, name)), name
+
+
+def test_sizes_of_arrays_in_c_hold_strands_and_neighbours():
+    sources = "".join(file.read_text(encoding="utf-8") for file in build.SOURCES)
+    given = [int(re.search(rf"\b{name} = (\d+)", sources)[1]) for name in ("K", "MOST_NEAR")]
+    assert given == [VERTICES, MOST_NEIGHBOURS] == [K, moving_skin.NEIGHBOURS]
