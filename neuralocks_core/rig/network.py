@@ -95,6 +95,11 @@ class RigModel:
         return len(feature_columns(self.spec))
 
     @property
+    def hidden(self) -> int:
+        """Width of the first hidden layer."""
+        return len(self.layers[0][1])
+
+    @property
     def dynamic(self) -> bool:
         """Whether it reads a history."""
         return bool(self.spec.bins)

@@ -52,16 +52,25 @@ def train(
     steps: Annotated[
         int | None, typer.Option(help="Train this many steps instead; the result is then reproducible.")
     ] = None,
+    begin: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL", help="Train this model of the same chains on, in smaller steps and with its material."
+        ),
+    ] = None,
     hidden: Annotated[int | None, typer.Option(help="Width of both layers; 32, or 16 if quasi-static.")] = None,
     clips: Annotated[
         int | None, typer.Option(help="Simulated motions to learn from; 256 if left out. Dynamic only.")
     ] = None,
     bend: Annotated[
-        float | None, typer.Option(help="Stiffness over line density, in m^4/s^2; 0.01 if left out.")
+        float | None, typer.Option(help="Stiffness over line density, in m^4/s^2; 0.01, or as --begin has it.")
     ] = None,
-    weight: Annotated[float | None, typer.Option(help="Weight as a multiple of gravity; 1 if left out.")] = None,
+    weight: Annotated[
+        float | None, typer.Option(help="Weight as a multiple of gravity; 1, or as --begin has it.")
+    ] = None,
     damping: Annotated[
-        float | None, typer.Option(help="Damping of motion in the head's frame [1/s]; 6 if left out. Dynamic only.")
+        float | None,
+        typer.Option(help="Damping of motion in the head's frame [1/s]; 6, or as --begin has it. Dynamic only."),
     ] = None,
     seed: Seed = 0,
     chains: Chains = None,
@@ -89,6 +98,7 @@ def train(
             clips=clips,
             material={name: value for name, value in changed.items() if value is not None},
             seed=seed,
+            begin=begin,
             chains=chains,
             head=head,
             skeleton=skeleton,

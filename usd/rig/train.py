@@ -12,6 +12,7 @@ from neuralocks_core.shortcomings import shortcomings
 
 from ..border.amounts import check_number
 from ..border.extras import check_training
+from .beginning import HIGHEST, LOWEST, Beginning
 from .notes import chain_notes, rigged_notes
 from .stage import check_patterns, read_rigged_hair
 
@@ -27,6 +28,7 @@ def train_rig(
     clips: int | None = None,
     material: dict | None = None,
     seed: int = 0,
+    begin=None,
     chains: list[str] | None = None,
     head: str | None = None,
     skeleton: str | None = None,
@@ -46,6 +48,7 @@ def train_rig(
             defaults replace None.
         clips: see the latter.
         material: fields of `rig.rods.RigMaterial`.
+        begin: a model file of the same kind and chains to train on, by default with its own material; `hidden` must be left out.
         chains, head, skeleton, joints: see `read_rigged_hair`.
         command: for the model card.
         early: also write the model before its report is measured, which takes minutes: whoever stops that has the model.
@@ -57,7 +60,8 @@ def train_rig(
         the RigModel.
 
     Raises:
-        NeuralocksError: the rig cannot be used, a number is out of its range, or the extra `train` is missing.
+        NeuralocksError: the rig or the model to begin with cannot be used, a number is out of its range, or the extra `train` is
+            missing.
     """
     material = material or {}
     _check_amounts(dynamic, seconds, steps, hidden, clips, material)
@@ -66,15 +70,18 @@ def train_rig(
 
     character, out = as_path(character, "character"), as_path(out, "out")
     check_writable(out)
+    former = None if begin is None else Beginning(begin, dynamic, hidden)
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=joints, all_shapes=True)
     check_patterns(hair, chains)
+    if former:
+        former.check(hair.rig.chains)
     notes = rigged_notes(hair.source) + chain_notes(hair, chains)
     if hair.rig.character.body is None:
         notes.append(f"{hair.source.path}: it skins no body mesh; the hair is trained without anything to collide with")
     if tell:
         tell(notes)
-    values = RigMaterial(**material)
-    options = {"seconds": seconds, "steps": steps, "hidden": hidden}
+    values = RigMaterial(**(former.material() if former else {}) | material)
+    options = {"seconds": seconds, "steps": steps, "hidden": hidden, "begin": former and former.model}
     if dynamic:
         from neuralocks_core.training.rig.dynamic import train_dynamic as train
 
@@ -87,6 +94,8 @@ def train_rig(
     def write(model) -> None:
         nonlocal written
         model.training.update(_card(hair.source.character, model, character.name))
+        if former:
+            model.training["began with"] = former.card()
         if command:
             model.training["command"] = command
         model.save(out)
@@ -123,7 +132,7 @@ def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict)
         ("steps", steps, 1, 10_000_000, True),
         ("hidden", hidden, 1, 256, True),
         ("clips", clips, 2, 10_000, True),
-        *((name, material.get(name), 1e-6, 1e4, False) for name in ("bend", "weight", "damping")),
+        *((name, material.get(name), LOWEST, HIGHEST, False) for name in ("bend", "weight", "damping")),
     ):
         if value is not None:
             check_number(f"--{name}", value, low, high, whole=whole)

@@ -21,6 +21,7 @@ from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Schedule, descend
 from neuralocks_core.training.muon import muon
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments, contact_weight
+from neuralocks_core.training.rig.deepest import LATE, DeepestPoses
 from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig.network import TinyNet
@@ -37,11 +38,14 @@ to squared errors [m^2]. Clips hold few of the poses that necks can take; energy
 _DEEP = 3.0
 """Contact in a held pose counts by its logarithm beyond this energy [m^2/s^2]: otherwise the few poses in which a lock would be
 deepest outweigh all those in which it would hang, and it stands out from the head in all of them."""
-_RATE = 3e-3
+_DEEPEST, _DEEPEST_ROOM = 2e-4, 0.012
+"""Weight of contact in the poses in which hair lies deepest, and the room kept there [m]."""
+_RATE, _RATE_ON = 3e-3, 5e-4
+"""Largest rate of a training that begins with nothing, and with a model."""
 _POOL = 256
 """Number of bodies held ready, and as many in motion."""
-_HELD, _MOVING = 16, 8
-"""Bodies in held poses and in motion whose contact counts in a step."""
+_HELD, _MOVING, _WORST = 16, 8, 8
+"""Bodies in held poses, in motion, and in the poses in which hair lies deepest, whose contact counts in a step."""
 _CLIP_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.3, 0.03, 40.0
 """Approximate time that each takes [s], for even progress."""
 _MOMENTS = 16
@@ -66,6 +70,7 @@ def train_dynamic(
     clip_seconds: float = 4.0,
     batch: int = 256,
     report_poses: int = 1000,
+    begin: RigModel | None = None,
     keep: Callable[[RigModel], None] | None = None,
     progress: Progress | None = None,
 ) -> RigModel:
@@ -75,12 +80,13 @@ def train_dynamic(
         rig: chains and body.
         material: constants; `damping` counts here.
         seconds: time for the regression, after the simulations; `steps`, if given, replaces it.
-        hidden: width of both layers.
+        hidden: width of both layers, unless `begin` decides it.
         seed: decides clips and initial weights.
         clips: number of random motions to simulate.
         clip_seconds: length of each [s].
         batch: pairs of consecutive samples per step.
         report_poses: held-out poses of the report, which also compares with spring bones in motion; 0 leaves it out.
+        begin: a dynamic model of the same chains to train on: with smaller steps, and contact counts fully from the first.
         keep: called with the model before its report is measured.
         progress: called with (done, total, message); may raise to stop.
     """
@@ -92,11 +98,14 @@ def train_dynamic(
     ends = np.cumsum([simulating, learning, _REPORT_TAKES])
     simulated, learned = (1000 * ends[:2] / ends[2]).astype(int).tolist()
     features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, within(say, 0, simulated))
-    held = HairOnBodies(rig, replace(material, margin=material.margin + _HELD_ROOM), _POOL, rng, spec)
-    moving = HairOnBodies(rig, replace(material, margin=material.margin + _ROOM), _POOL, rng, spec, moments)
+    held = HairOnBodies(rig, _roomy(material, _HELD_ROOM), _POOL, rng, spec)
+    moving = HairOnBodies(rig, _roomy(material, _ROOM), _POOL, rng, spec, moments)
+    deepest = DeepestPoses(rig, _roomy(material, _DEEPEST_ROOM), *rng.spawn(1), spec) if held.pool.collides else None
     inputs, wanted = torch.as_tensor(features), torch.as_tensor(turns)
-    net = TinyNet(hidden, held.pool, spec)
+    net = TinyNet(begin.hidden if begin else hidden, held.pool, spec)
     net.normalise(features.reshape(-1, features.shape[-1]))
+    if begin:
+        net.begin_as(begin)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
         clip = torch.as_tensor(rng.integers(0, inputs.shape[0], batch))
@@ -112,15 +121,18 @@ def train_dynamic(
         if held.pool.collides:
             # Near the body a small error may be a deep one, which squared errors do not show.
             elastic, collision = held.parts(net, _HELD)
-            felt = contact_weight(done)
-            bounded = _DEEP * torch.log1p(collision / _DEEP)
-            result["held"] = felt * _HELD_COLLISION * bounded.mean() + _HELD_ELASTIC * elastic.mean()
+            stage = 1.0 if begin else done
+            felt = contact_weight(stage)
+            result["held"] = felt * _HELD_COLLISION * _bounded(collision).mean() + _HELD_ELASTIC * elastic.mean()
             result["moving"] = felt * _COLLISION * moving.parts(net, _MOVING)[1].mean()
+            if stage >= LATE:
+                result["deepest"] = _DEEPEST * _bounded(deepest.contact(net, _WORST)).mean()
         return result
 
     began = time.monotonic()
-    schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
-    for state in descend(muon(net, _RATE, 0.1), losses, schedule, remedy=REMEDIES["rig"]):
+    rate = _RATE_ON if begin else _RATE
+    schedule = Schedule(minutes=seconds / 60, steps=steps, rate=rate, warm_up=50)
+    for state in descend(muon(net, rate, 0.1), losses, schedule, remedy=REMEDIES["rig"]):
         far = simulated + int((learned - simulated) * state.done)
         say(far, 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
     training = {
@@ -131,7 +143,7 @@ def train_dynamic(
         "clips": clips,
         "clip_seconds": clip_seconds,
         "batch": batch,
-        "hidden": hidden,
+        "hidden": net.hidden,
         "material": asdict(material),
     }
     model = net.model(rig.chains, training)
@@ -144,6 +156,14 @@ def train_dynamic(
         model.report.update(motion_report(rig, material, {"dynamic network": model}, progress=in_motion))
         say(1000, 1000, "report done")
     return model
+
+
+def _roomy(material: RigMaterial, room: float) -> RigMaterial:
+    return replace(material, margin=material.margin + room)
+
+
+def _bounded(collision: torch.Tensor) -> torch.Tensor:
+    return _DEEP * torch.log1p(collision / _DEEP)
 
 
 def _marks(energy: RigEnergy, turns: torch.Tensor) -> torch.Tensor:

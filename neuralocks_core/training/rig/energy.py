@@ -112,6 +112,16 @@ class RigEnergy(torch.nn.Module):
         normals, offsets = pool.planes(poses, points.detach().numpy())
         return elastic, self.collision(points, torch.as_tensor(normals), torch.as_tensor(offsets), some)
 
+    def depths(self, pool: PosePool, poses, quaternions) -> np.ndarray:
+        """How deep in the body the deepest hair vertex is, (B,) [m], less than zero outside; those that rest in the body do not
+        count. Arguments as of `parts`.
+        """
+        rotation, position, _ = self.pose(quaternions)
+        points = self.skin(rotation, position).numpy()
+        normals, offsets = pool.planes(poses, points)
+        depth = offsets - np.einsum("bvi,bvi->bv", normals, points)
+        return np.where(self.margins > 0, depth, -np.inf).max(axis=1)
+
     def elastic(self, quaternions, gravity, ends) -> torch.Tensor:
         """Gravity and bend-twist (B,) [m^2/s^2] of turns (B, N, 4) wxyz, whose bones end at `ends` (B, M, 3) [m];
         `gravity` (B, 3) in the head's frame [m/s^2].

@@ -22,7 +22,7 @@ class TinyNet(torch.nn.Module):
 
     def __init__(self, hidden: int, pool: PosePool, spec):
         super().__init__()
-        self.joints, self.spec = len(pool.rig.chains), spec
+        self.hidden, self.joints, self.spec = hidden, len(pool.rig.chains), spec
         sample = np.arange(min(pool.count, 512))
         features = pool.features(spec, sample, pool.gravity(sample))
         self.register_buffer("mean", torch.as_tensor(features.mean(0)))
@@ -41,6 +41,19 @@ class TinyNet(torch.nn.Module):
         deviation[POSE:] *= 3.0  # so that the long history does not drown the pose
         self.scale.copy_(torch.as_tensor(1 / deviation))
         self.mean[POSE:] = 0
+
+    def begin_as(self, model: RigModel) -> None:
+        """Take over the weights of a model of as many joints, as wide and with the same inputs; call `normalise` first."""
+        axes = model.chains.axes
+        w, b = zip(*((weight.astype(float), bias.astype(float)) for weight, bias in model.layers))
+        turned = np.einsum("nij,njk->nik", axes, w[2].reshape(-1, 3, w[2].shape[1])).reshape(w[2].shape)
+        mean, scale = self.mean.double().numpy(), self.scale.double().numpy()
+        # The last biases only cancel the answer to the bind pose, which is subtracted here.
+        values = ((w[0] / scale, b[0] + w[0] @ mean), (w[1], b[1]), (turned, 0 * b[2]))
+        with torch.no_grad():
+            for layer, (weight, bias) in zip(self.layers, values, strict=True):
+                layer.weight.copy_(torch.as_tensor(weight))
+                layer.bias.copy_(torch.as_tensor(bias))
 
     def raw(self, features: torch.Tensor) -> torch.Tensor:
         """Unbounded outputs (B, 3 N) of features (B, F)."""

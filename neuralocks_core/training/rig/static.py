@@ -18,6 +18,7 @@ from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Schedule, descend
 from neuralocks_core.training.muon import muon
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
+from neuralocks_core.training.rig.deepest import LATE, DeepestPoses
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
 from neuralocks_core.training.threads import threads
@@ -29,7 +30,8 @@ _ROOM = 0.01
 is not exact to the millimetre, so hair goes less deep into the body with this."""
 _COLLISION = 0.3
 """Factor on the body's stiffness."""
-_RATE = 3e-3
+_RATE, _RATE_ON = 3e-3, 5e-4
+"""Largest rate of a training that begins with nothing, and with a model."""
 _LEARNING = 700
 """Thousandths of the work that are learning, by default; the rest is the report."""
 
@@ -45,6 +47,7 @@ def train_static(
     seed: int = 0,
     batch: int = 32,
     report_poses: int = 1000,
+    begin: RigModel | None = None,
     keep: Callable[[RigModel], None] | None = None,
     progress: Progress | None = None,
 ) -> RigModel:
@@ -54,10 +57,11 @@ def train_static(
         rig: chains, hair vertices and body.
         material: constants of the energy.
         seconds: time to train; `steps`, if given, replaces it and makes the result repeatable.
-        hidden: width of both layers (the paper's 16).
+        hidden: width of both layers (the paper's 16), unless `begin` decides it.
         seed: decides poses and initial weights.
         batch: poses per step.
         report_poses: held-out poses of the report; 0 leaves it out.
+        begin: a quasi-static model of the same chains to train on: with smaller steps, and contact counts fully from the first.
         keep: called with the model before its report is measured.
         progress: called with (done, total, message); may raise to stop.
     """
@@ -68,15 +72,23 @@ def train_static(
     say(0, 1, "posing bodies")
     roomy = replace(material, margin=material.margin + _ROOM)
     held = HairOnBodies(rig, roomy, _POOL, rng, spec)
-    net = TinyNet(hidden, held.pool, spec)
+    deepest = DeepestPoses(rig, roomy, *rng.spawn(1), spec) if held.pool.collides else None
+    net = TinyNet(begin.hidden if begin else hidden, held.pool, spec)
+    if begin:
+        net.begin_as(begin)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
         elastic, collision = held.parts(net, batch)
-        return {"elastic": elastic.mean(), "collision": contact_weight(done) * _COLLISION * collision.mean()}
+        stage = 1.0 if begin else done
+        result = {"elastic": elastic.mean(), "collision": contact_weight(stage) * _COLLISION * collision.mean()}
+        if deepest and stage >= LATE:
+            result["deepest"] = _COLLISION * deepest.contact(net, batch // 4).mean()
+        return result
 
     began = time.monotonic()
-    schedule = Schedule(minutes=seconds / 60, steps=steps, rate=_RATE, warm_up=50)
-    for state in descend(muon(net, _RATE, 0.0), losses, schedule, remedy=REMEDIES["rig"]):
+    rate = _RATE_ON if begin else _RATE
+    schedule = Schedule(minutes=seconds / 60, steps=steps, rate=rate, warm_up=50)
+    for state in descend(muon(net, rate, 0.0), losses, schedule, remedy=REMEDIES["rig"]):
         say(int(_LEARNING * state.done), 1000, f"energy {sum(state.losses.values()):.3f} m^2/s^2")
     training = {
         "method": "quasi-static, self-supervised",
@@ -84,7 +96,7 @@ def train_static(
         "seconds": round(time.monotonic() - began, 1),
         "seed": seed,
         "batch": batch,
-        "hidden": hidden,
+        "hidden": net.hidden,
         "material": asdict(material),
     }
     model = net.model(rig.chains, training)

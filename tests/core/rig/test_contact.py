@@ -2,6 +2,7 @@
 """What mesh hair does at the body: in the simulation of its chains, and in what networks learn from."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import from_quaternion, from_vector
 from neuralocks_core.skinned_body import Body
+from neuralocks_core.training.rig import deepest
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig.body import BodyPatch
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments
@@ -90,13 +92,11 @@ def test_bodies_in_motion_are_those_that_were_met():
     hair = HairOnBodies(rig, RigMaterial(), 16, np.random.default_rng(0), spec, Moments(features, skinning))
     seen = []
 
-    def still(read):
+    def noted(read):
         seen.append(read.numpy())
-        turns = torch.zeros(len(read), len(rig.chains), 4)
-        turns[..., 0] = 1
-        return turns
+        return still(rig, read)
 
-    hair.parts(still, 64)
+    hair.parts(noted, 64)
     rows = (seen[0][:, None] == features).all(-1)
     assert rows.any(1).all() and rows.any(0).all()
     neck = hair.pool.relative[:, 0]
@@ -104,22 +104,45 @@ def test_bodies_in_motion_are_those_that_were_met():
     np.testing.assert_allclose(neck, expected[hair.pool.moment], atol=1e-12)
 
 
-def test_hair_comes_back_to_where_it_lay_deepest(monkeypatch):
-    """For half of a batch, where the same answer costs more than in new poses; replaced poses are forgotten."""
-    monkeypatch.setattr("neuralocks_core.training.rig.contact.HARD", 16)
+def cap_over_a_chest() -> HairRig:
+    """Points all round the head that no joint moves, and a chest which they touch in some poses."""
     rig = on_a_ball()
     points = np.random.default_rng(0).normal(0, 1, (40, 3))
     points = CENTRE + 1.3 * RADIUS * points / np.linalg.norm(points, axis=1, keepdims=True)
-    rig = replace(with_chest(rig), points=points, weights=np.eye(1, len(rig.chains) + 1).repeat(len(points), 0))
+    return replace(with_chest(rig), points=points, weights=np.eye(1, len(rig.chains) + 1).repeat(len(points), 0))
+
+
+def still(rig: HairRig, features) -> torch.Tensor:
+    """A network's answer: no turns."""
+    return torch.as_tensor(no_turns(rig), dtype=torch.float32).expand(len(features), -1, -1)
+
+
+def test_hair_comes_back_to_where_it_lay_deepest(monkeypatch):
+    """For half of a batch, where the same answer costs more than in new poses; replaced poses are forgotten."""
+    monkeypatch.setattr("neuralocks_core.training.rig.contact.HARD", 16)
+    rig = cap_over_a_chest()
     held = HairOnBodies(rig, RigMaterial(), 64, np.random.default_rng(0), rig_spec())
-
-    def still(features):
-        turns = torch.zeros(len(features), len(rig.chains), 4)
-        turns[..., 0] = 1
-        return turns
-
-    costs = np.array([held.parts(still, 8)[1].numpy() for _ in range(200)])[20:]
+    costs = np.array([held.parts(partial(still, rig), 8)[1].numpy() for _ in range(200)])[20:]
     assert costs[:, :4].mean() > 1.3 * costs[:, 4:].mean() > 0
+
+
+def test_the_deepest_of_many_poses_are_learned_from(monkeypatch):
+    """Of all that are searched, those in which a vertex is deepest, again after some are replaced."""
+    monkeypatch.setattr(deepest, "KEPT", 8)
+    monkeypatch.setattr(deepest, "EVERY", 2)
+    monkeypatch.setattr(deepest, "RENEWED", 32)
+    rig = cap_over_a_chest()
+    poses = deepest.DeepestPoses(rig, RigMaterial(), np.random.default_rng(0), rig_spec(), searched=64)
+    energy, pool, rows = RigEnergy(rig, RigMaterial()), poses._pool, np.arange(64)
+    before = None
+    for _ in range(3):
+        costs = [poses.contact(partial(still, rig), 8).sort().values for _ in range(2)]
+        depth = energy.depths(pool, rows, still(rig, rows))
+        assert 0 < (depth > 0).sum() < 64 and (before is None or 0 < (before != depth).sum() <= 32)
+        worst = np.argsort(-depth)[:8]
+        wanted = energy.parts(pool, worst, still(rig, worst), np.zeros((8, 3)))[1].sort().values
+        assert torch.equal(costs[0], wanted) and torch.equal(costs[1], wanted)
+        before = depth
 
 
 def with_chest(rig: HairRig) -> HairRig:

@@ -23,9 +23,10 @@ from neuralocks_core.training.rig.body import posed_distances, rest_distances
 from neuralocks_core.training.rig.dynamic import train_dynamic
 from neuralocks_core.training.rig.energy import RigEnergy, bounded_turns
 from neuralocks_core.training.rig.motion import SPRINGS, motion_report
+from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.poses import PosePool
 from neuralocks_core.training.rig.static import train_static
-from tests.core.rig.builders import character, random_model, tail
+from tests.core.rig.builders import character, random_features, random_model, tail
 
 
 def branched() -> HairRig:
@@ -55,6 +56,31 @@ def test_torch_and_numpy_pose_alike():
     np.testing.assert_allclose(
         energy.skin(rotation, position).numpy(), skin(rig.chains, *ours, rig.points, rig.weights)
     )
+
+
+@pytest.mark.parametrize("dynamic", [False, True])
+def test_a_training_begins_as_the_model_that_it_is_given(dynamic):
+    """Whatever the joints' axes and the scale of the inputs: its turns are the model's, and a step changes them little."""
+    rig, spec = branched(), rig_spec(dynamic)
+    axes = from_vector(np.random.default_rng(0).normal(size=(len(rig.chains), 3)))
+    rig = replace(rig, chains=replace(rig.chains, axes=axes))
+    torch.manual_seed(0)
+    former, net = (TinyNet(6, PosePool(rig, 64, np.random.default_rng(seed)), spec) for seed in (0, 1))
+    torch.nn.init.normal_(former.layers[2].weight, std=0.5)
+    model = former.model(rig.chains, {})
+    features = random_features(model, 64)
+    if dynamic:
+        net.normalise(features)
+    net.begin_as(model)
+    with torch.no_grad():
+        turns = net(torch.as_tensor(features)).numpy()
+    assert np.abs(turns[..., 1:]).max() > 0.3
+    np.testing.assert_allclose(turns, model.canonical_turns(features), atol=5e-6)
+    train, few = (train_dynamic, {"clips": 2, "clip_seconds": 0.5}) if dynamic else (train_static, {})
+    trained = train(rig, steps=1, report_poses=0, begin=model, **few)
+    assert trained.training["hidden"] == 6
+    off = np.abs(trained.canonical_turns(features) - turns).max()
+    assert 0 < off < 0.02
 
 
 def test_gradient_of_the_energy():

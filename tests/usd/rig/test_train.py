@@ -2,15 +2,17 @@
 """What `rig train` refuses before it reads anything: what it needs and lacks, and numbers that no training can use."""
 
 import sys
+from dataclasses import replace
 
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rig import RigModel
+from neuralocks_core.rig import RigModel, rig_spec
 from usd.models.train import train
 from usd.rig.train import train_rig
 
-from ..rig_shots import small_shot
+from ...core.rig.builders import random_model
+from ..rig_shots import EXAMPLE, small_shot
 
 
 @pytest.mark.parametrize("package", ["torch", "onnx", "warp"])
@@ -54,6 +56,44 @@ def test_numbers_that_no_training_can_use_are_refused(tmp_path, given, said):
     with pytest.raises(NeuralocksError) as caught:
         train_rig(tmp_path / "none.usda", tmp_path / "m.neuralocks", **given)
     assert said in str(caught.value)
+
+
+def test_a_model_that_cannot_be_trained_on_is_refused(tmp_path):
+    """Before the rig is read, or before anything is simulated."""
+    pytest.importorskip("torch")
+    out, shot = tmp_path / "m.neuralocks", small_shot(tmp_path / "who.usda")
+    still, other, odd = EXAMPLE / "quasi_static.neuralocks", tmp_path / "other.neuralocks", tmp_path / "odd.neuralocks"
+    random_model((2, 3), spec=rig_spec()).save(other)
+    replace(RigModel.load(still), training={"material": {"bend": "stiff"}}).save(odd)
+    for given, said in (
+        (
+            {"begin": still},
+            "quasi_static.neuralocks: it is quasi-static; train with --quasi-static, or begin with another",
+        ),
+        (
+            {"begin": still, "dynamic": False, "hidden": 8},
+            "--hidden: the model of --begin has layers of 16; leave one of",
+        ),
+        ({"begin": other, "dynamic": False}, r"other.neuralocks: model: .*hair"),
+        (
+            {"begin": odd, "dynamic": False, "character": EXAMPLE / "character.usda"},
+            "odd.neuralocks: model: its bend 'stiff': must",
+        ),
+        ({"begin": tmp_path / "none.neuralocks"}, "none.neuralocks"),
+    ):
+        with pytest.raises(NeuralocksError, match=said):
+            train_rig(**{"character": shot, "out": out} | given)
+    assert not out.exists()
+
+
+def test_a_card_says_what_training_began_with(tmp_path):
+    pytest.importorskip("torch")
+    shot, first, then = (tmp_path / name for name in ("who.usda", "first.neuralocks", "then.neuralocks"))
+    small = {"steps": 2, "dynamic": False, "command": "made so"}
+    train_rig(small_shot(shot), first, hidden=4, material={"bend": 0.03, "weight": 2.0}, **small)
+    card = train_rig(shot, then, begin=first, material={"weight": 1.5}, **small).training
+    assert card["hidden"] == 4 and (card["material"]["bend"], card["material"]["weight"]) == (0.03, 1.5)
+    assert card["began with"].items() >= {"command": "made so", "steps": 2, "seed": 0}.items()
 
 
 @pytest.mark.parametrize("early", [True, False])
