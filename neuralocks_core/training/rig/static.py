@@ -18,7 +18,6 @@ from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Schedule, descend
 from neuralocks_core.training.muon import muon
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
-from neuralocks_core.training.rig.deepest import LATE, DeepestPoses
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
 from neuralocks_core.training.threads import threads
@@ -72,18 +71,14 @@ def train_static(
     say(0, 1, "posing bodies")
     roomy = replace(material, margin=material.margin + _ROOM)
     held = HairOnBodies(rig, roomy, _POOL, rng, spec)
-    deepest = DeepestPoses(rig, roomy, *rng.spawn(1), spec) if held.pool.collides else None
     net = TinyNet(begin.hidden if begin else hidden, held.pool, spec)
     if begin:
         net.begin_as(begin)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
         elastic, collision = held.parts(net, batch)
-        stage = 1.0 if begin else done
-        result = {"elastic": elastic.mean(), "collision": contact_weight(stage) * _COLLISION * collision.mean()}
-        if deepest and stage >= LATE:
-            result["deepest"] = _COLLISION * deepest.contact(net, batch // 4).mean()
-        return result
+        felt = contact_weight(1.0 if begin else done)
+        return {"elastic": elastic.mean(), "collision": felt * _COLLISION * collision.mean()}
 
     began = time.monotonic()
     rate = _RATE_ON if begin else _RATE
