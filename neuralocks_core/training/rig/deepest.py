@@ -16,7 +16,7 @@ EVERY, RENEWED = 150, 512
 """Steps from one search to the next, and poses that are replaced before it."""
 LATE = 0.75
 """Share of the budget after which they count in a training that begins with nothing, when hair hangs and steps are small: from
-the start, they push locks off the body for good."""
+the start, with weights that clear the body, they push locks far off it."""
 _TOGETHER = 64
 
 

@@ -98,6 +98,7 @@ def train_dynamic(
     ends = np.cumsum([simulating, learning, _REPORT_TAKES])
     simulated, learned = (1000 * ends[:2] / ends[2]).astype(int).tolist()
     features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, within(say, 0, simulated))
+    say(simulated, 1000, "posing bodies")
     held = HairOnBodies(rig, _roomy(material, _HELD_ROOM), _POOL, rng, spec)
     moving = HairOnBodies(rig, _roomy(material, _ROOM), _POOL, rng, spec, moments)
     deepest = DeepestPoses(rig, _roomy(material, _DEEPEST_ROOM), *rng.spawn(1), spec) if held.pool.collides else None

@@ -9,9 +9,11 @@ import pytest
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel, rig_spec
 from usd.models.train import train
+from usd.rig.beginning import Beginning
+from usd.rig.stage import read_rigged_hair
 from usd.rig.train import train_rig
 
-from ...core.rig.builders import random_model
+from ...core.rig.builders import random_model, random_rig_model
 from ..rig_shots import EXAMPLE, small_shot
 
 
@@ -84,6 +86,19 @@ def test_a_model_that_cannot_be_trained_on_is_refused(tmp_path):
         with pytest.raises(NeuralocksError, match=said):
             train_rig(**{"character": shot, "out": out} | given)
     assert not out.exists()
+
+
+def test_a_model_of_another_network_or_other_chains_is_refused(tmp_path):
+    """What would otherwise begin with wrong weights."""
+    still, model = RigModel.load(EXAMPLE / "quasi_static.neuralocks"), tmp_path / "m.neuralocks"
+    replace(still, max_angle=2.0).save(model)
+    with pytest.raises(NeuralocksError, match="m.neuralocks: its network is built differently from this one"):
+        Beginning(model, False, None)
+    some = read_rigged_hair(EXAMPLE / "character.usda", chains=["hair_nape_l_1"]).rig.chains
+    assert 0 < len(some) < len(still.chains)
+    random_rig_model(some, rig_spec(), 16, 0).save(model)
+    with pytest.raises(NeuralocksError, match=f"its {len(some)} joints are not the {len(still.chains)} of this rig"):
+        Beginning(model, False, None).check(still.chains)
 
 
 def test_a_card_says_what_training_began_with(tmp_path):
