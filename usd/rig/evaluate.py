@@ -4,14 +4,18 @@
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from neuralocks_core import metrics
 from neuralocks_core.body.enclosed import proven_distances
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.rigging import moving_joints
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT
@@ -25,8 +29,8 @@ from .stage import RiggedHair, check_patterns, core_meshes, read_rigged_hair
 
 VERTICES = 4000
 """Most vertices of the hair that are measured, evenly over its meshes."""
-FRAMES = 48
-"""Frames in which distances to the body are measured, evenly over the animation."""
+FRAMES, DEEPEST_FRAMES = 48, 8
+"""Frames in which distances to the body are measured: the former evenly over the animation, the latter where hair seems deepest."""
 ROUNDING = 0.01
 """Less than this [mm] counts as no swing and no depth."""
 
@@ -41,8 +45,9 @@ class RigCard:
         measures: `joints`, `chains`, `vertices`, `frames`; `swing_mm`: how far vertices are from where they would be carried
             rigidly (root mean square), `swing_most`: the chain that swings most, `swing_most_mm`; `jitter_mm`: the farthest
             that a vertex goes from one frame to the next once a pose has been held for two seconds, NaN if none is, or in gusts;
-            `body` and `body_rigid`: `metrics.penetration` of the animation and of hair carried rigidly, in `body_frames`
-            frames, with `deepest_at` (time code) and `deepest` (chain). Without a body near the hair, these are missing.
+            `body` and `body_rigid`: `metrics.penetration` of the animation and of hair carried rigidly, shares in `body_frames`
+            frames, the worst depth in those, too, in which hair seems deepest, with `deepest_at` (time code) and `deepest` (chain).
+            Without a body near the hair, these are missing.
         notes: what a user should know.
     """
 
@@ -110,7 +115,7 @@ def evaluate_rig(
     picked = np.linspace(0, len(some) - 1, min(len(some), VERTICES)).round().astype(int)
     vertices, lock = some[picked], rig.chains.chain[rig.weights[picked, 1:].argmax(axis=1)]
     posed = _Posed(hair, vertices, moving)
-    off, jitter, seen = _moved(posed, moving, say)
+    off, jitter, seen, deep = _moved(posed, moving, say)
     each = {i: float(np.sqrt(off[lock == i].mean())) for i in np.unique(lock)}
     most = max(each, key=each.__getitem__)
     wind = source.source.animation and recorded_wind(source.source.animation, hair.border)
@@ -127,7 +132,7 @@ def evaluate_rig(
         "jitter_mm": jitter,
     }
     if rig.character.body is not None:
-        measures |= _depths(posed, seen, [rig.chains.chain_name(int(i)) for i in lock], say)
+        measures |= _depths(posed, seen, deep, [rig.chains.chain_name(int(i)) for i in lock], say)
     notes = rigged_notes(source) + chain_notes(hair, chains) + _not_measured(hair)
     return RigCard(Path(baked), source.path, measures, notes)
 
@@ -142,6 +147,11 @@ class _Posed:
         self._hair = self._character.body.part(vertices, np.zeros((0, 3), int))
         self.at_rest = self._character.canonical(self._hair.points)
 
+    @cached_property
+    def from_skin(self) -> np.ndarray:
+        """Signed distances (V,) [m] of the vertices to the skin in bind pose."""
+        return proven_distances(self._character.canonical(self.skin.points), self.skin.triangles, self.at_rest)
+
     def each(self, say) -> Iterator[np.ndarray]:
         """Vertices (2, V, 3) of one sample after the other, and where they would be carried rigidly."""
         for row, (joints, shape) in enumerate(zip(self.clip.joints, self.clip.shape)):
@@ -149,21 +159,33 @@ class _Posed:
             yield np.stack([self._hair.posed(self._character.skinning(here), shape) for here in both])
             say(row + 1, len(self.clip.joints), "posing the hair")
 
-    def distances(self, row: int | None, points: np.ndarray) -> np.ndarray:
-        """Signed distances (N,) [m] of points (N, 3) to the skin at a sample, or in bind pose."""
-        if row is None:
-            vertices = self._character.canonical(self.skin.points)
-        else:
-            vertices = self.skin.posed(self._character.skinning(self.clip.joints[row]), self.clip.shape[row])
-        return proven_distances(vertices, self.skin.triangles, points)
+    def distances(self, row: int, points: np.ndarray) -> np.ndarray:
+        """Signed distances (N,) [m] of points (N, 3) to the skin at a sample."""
+        return proven_distances(self._skin_at(row), self.skin.triangles, points)
+
+    def seemingly(self, row: int, points: np.ndarray) -> float:
+        """How deep in the skin the deepest of points (V, 3) seems to be [m]: beneath the plane of the vertex nearest to it, and
+        deeper than at rest.
+        """
+        vertices, used = self._skin_at(row), np.unique(self.skin.triangles)
+        nearest = used[cKDTree(vertices[used]).query(points)[1]]
+        normals = vertex_normals(vertices, self.skin.triangles)[nearest]
+        heights = np.einsum("vi,vi->v", points - vertices[nearest], normals)
+        return float(np.max(np.minimum(self.from_skin, 0) - heights))
+
+    def _skin_at(self, row: int) -> np.ndarray:
+        return self.skin.posed(self._character.skinning(self.clip.joints[row]), self.clip.shape[row])
 
 
-def _moved(posed: _Posed, moving: np.ndarray, say) -> tuple[np.ndarray, float, dict[int, np.ndarray]]:
+def _moved(
+    posed: _Posed, moving: np.ndarray, say
+) -> tuple[np.ndarray, float, dict[int, np.ndarray], dict[int, np.ndarray]]:
     """Mean squared distances (V,) [m^2] of vertices from where they would be carried rigidly; the largest step [mm] of any
     where all other joints have been still for `metrics.QUIET_AFTER`, NaN if they never are; and the vertices (2, V, 3) of the rows in
-    which distances to the body are measured. Other vertices are not kept: a long animation has gigabytes of them.
+    which distances to the body are measured, evenly spread ones, and others in which hair seems deepest. Other vertices are not
+    kept: a long animation has gigabytes of them.
     """
-    clip, total, steps, seen, before = posed.clip, 0.0, [], {}, None
+    clip, total, steps, seen, deep, before = posed.clip, 0.0, [], {}, [], None
     still = metrics.held(clip.joints[:, ~moving], clip.times)
     quiet = clip.times - np.maximum.accumulate(np.where(still, -np.inf, clip.times)) >= metrics.QUIET_AFTER
     wanted = set(np.linspace(0, len(clip.times) - 1, min(len(clip.times), FRAMES)).round().astype(int).tolist())
@@ -173,22 +195,26 @@ def _moved(posed: _Posed, moving: np.ndarray, say) -> tuple[np.ndarray, float, d
             steps.append(metrics.jitter(np.stack([before, both[0]])))
         if row in wanted:
             seen[row] = both
+        elif posed.skin is not None:
+            deep = sorted([*deep, (posed.seemingly(row, both[0]), row, both)], key=itemgetter(0))[-DEEPEST_FRAMES:]
         before = both[0]
-    return total / len(clip.times), max(steps, default=float("nan")), seen
+    return total / len(clip.times), max(steps, default=float("nan")), seen, {row: both for _, row, both in deep}
 
 
-def _depths(posed: _Posed, seen: dict[int, np.ndarray], locks: list[str], say) -> dict:
-    """How far the `seen` vertices are inside the body, as the animation moves them and as they would be carried rigidly."""
-    rows, at_rest, measured = list(seen), posed.distances(None, posed.at_rest), []
+def _depths(posed: _Posed, seen: dict[int, np.ndarray], deep: dict[int, np.ndarray], locks: list[str], say) -> dict:
+    """How far vertices of `_moved` are inside the body, as the animation moves them and as they would be carried rigidly."""
+    kept, rows, measured = seen | deep, [*seen, *deep], []
     with ThreadPoolExecutor(cores()) as pool:
-        for done, distance in enumerate(pool.map(lambda row: posed.distances(row, seen[row].reshape(-1, 3)), rows)):
+        for done, distance in enumerate(pool.map(lambda row: posed.distances(row, kept[row].reshape(-1, 3)), rows)):
             measured.append(distance.reshape(2, -1))
             say(done + 1, len(rows), "measuring distances to the body")
-    result: dict = {"body_frames": len(rows)}
+    result: dict = {"body_frames": len(seen)}
     for name, distance in zip(("body", "body_rigid"), np.stack(measured, axis=1)):
-        row, vertex = np.unravel_index(np.argmin(distance - np.minimum(at_rest, 0)), distance.shape)
+        row, vertex = np.unravel_index(np.argmin(distance - np.minimum(posed.from_skin, 0)), distance.shape)
         deepest = {"deepest_at": float(posed.codes[rows[row]]), "deepest": locks[vertex]}
-        result[name] = metrics.penetration(distance, at_rest) | deepest
+        shares = metrics.penetration(distance[: len(seen)], posed.from_skin)
+        worst = metrics.penetration(distance, posed.from_skin)["penetration_worst_mm"]
+        result[name] = shares | {"penetration_worst_mm": worst} | deepest
     return result
 
 

@@ -52,7 +52,7 @@ def test_swing_is_what_usd_shows(tmp_path, scale, z_up):
     assert card["swing_most"] == "hair_0" and "body" not in card
 
 
-def test_depths_are_those_of_a_known_body(tmp_path):
+def test_depths_are_those_of_a_known_body(tmp_path, monkeypatch):
     """A wall 5 mm behind the tail's rest place: for each vertex it is known whether it goes in, and how deep."""
     shot = small_shot(tmp_path / "shot.usda")
     baked = bake_rig(shot, tmp_path / "baked.usda", model_for(read_rigged_hair(shot))).path
@@ -72,6 +72,11 @@ def test_depths_are_those_of_a_known_body(tmp_path):
     depth = np.maximum(wall - moved[..., 2], 0)
     assert depth.max() > 0.005, "the tail does not reach the wall"
     card = evaluate_rig(baked).measures
+    monkeypatch.setattr("usd.rig.evaluate.FRAMES", 2)
+    few = evaluate_rig(baked).measures
+    assert few["body_frames"] == 2 and few["body"]["deepest_at"] not in (CODES[0], CODES[-1])
+    for deepest in ("penetration_worst_mm", "deepest_at", "deepest"):
+        assert few["body"][deepest] == card["body"][deepest], "the deepest frame counts, wherever it is"
     assert card["body_frames"] == 25
     assert card["body"]["penetration_worst_mm"] == pytest.approx(1e3 * depth.max(), abs=0.01)
     assert card["body"]["penetration_percent"] == pytest.approx(100 * (depth > 2e-6).mean(), abs=0.01)
