@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
+from neuralocks_core.anatomy.humanoid import Humanoid, copies, find_humanoid
 from neuralocks_core.anatomy.own_skin import own_skin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, rotation_part, sizes, transformed
@@ -211,12 +211,17 @@ class Character:
         return None if self.body is None else self.body.posed(np.asarray(joints, float) @ self.inverse_bind, shape)
 
     @cached_property
+    def of_head(self) -> np.ndarray:
+        """Which joints (J,) bool are the head or below it, or below a copy of it: a control rig's face hangs from one."""
+        every = [self.head, *copies(self.head, self.skeleton.parents, self.skeleton.bind[:, :3, 3])]
+        return np.any([self.skeleton.below(joint) for joint in every], axis=0)
+
+    @cached_property
     def on_head(self) -> np.ndarray | None:
         """Which body vertices (V,) move mainly with the head or a joint below it, including hats and hair cards."""
         if self.body is None:
             return None
-        below = self.skeleton.below(self.head)
-        return np.sum(self.body.joint_weights * below[self.body.joint_indices], axis=1) > 0.5
+        return np.sum(self.body.joint_weights * self.of_head[self.body.joint_indices], axis=1) > 0.5
 
     @cached_property
     def skin(self) -> np.ndarray | None:

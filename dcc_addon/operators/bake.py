@@ -160,7 +160,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
             result = yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
             baked |= {name: (str(out), prims[name]) for name in names}
             written |= prims
-            notes += [for_the_panel(with_objects(note, prims)) for note in result.notes]
+            notes += [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in result.notes]
     for out in outs:
         attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()})
     return Baked(baked, list(dict.fromkeys(notes)), written)

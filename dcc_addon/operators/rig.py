@@ -41,9 +41,9 @@ class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
     def work(self, context):
         armature = shown_armature(context)
         sampled = ensure(context, armature)
-        chains = chains_of(sampled.character, armature.neuralocks_character.chains, armature.name_full)
+        chains = chains_of(sampled.rig, sampled.character, armature.neuralocks_character.chains)
         lines = [
-            f"{chains.chain_name(i)}: {int((chains.chain == i).sum())} bones, {100 * chains.chain_length(i):.0f} cm"
+            f"{sampled.rig.said(chains.chain_name(i))}: {int((chains.chain == i).sum())} bones, {100 * chains.chain_length(i):.0f} cm"
             for i in range(len(chains.roots))
         ]
         session.cards[armature.name_full] = lines
@@ -139,7 +139,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
                 "Baking the hair bones",
             )
             result = yield from job.steps(0.5)
-        notes = [for_the_panel(with_objects(note, prims)) for note in result.notes]
+        notes = [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in result.notes]
         tell(self, f"{name}: hair bones written to {out}", notes)
 
 

@@ -135,7 +135,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
                 "character": str(character),
                 "out": out,
                 "minutes": scene.neuralocks.train_minutes,
-                "chains": [c.strip() for c in armature.neuralocks_character.chains.split(",") if c.strip()],
+                "chains": sampled.rig.patterns(armature.neuralocks_character.chains),
                 "head": sampled.character.skeleton.names[sampled.character.head],
             }
             _running.append(_Training(TrainingJob(python, settings), _Target.of(target, self.kind), folder, prims))

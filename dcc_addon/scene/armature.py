@@ -5,6 +5,7 @@ import numpy as np
 
 from ..services import names
 from ..services.rig import RigArrays
+from .skinned import bones_with_skin
 
 
 def matrix(value) -> np.ndarray:
@@ -30,6 +31,7 @@ def read(armature, head_bone: str = "") -> RigArrays:
         np.array([place[parents[i]] if parents[i] >= 0 else -1 for i in order], int),
         rest.astype(float).swapaxes(1, 2)[order],
         head_bone,
+        np.isin([bones[i].name for i in order], list(bones_with_skin(armature))),
     )
 
 

@@ -15,6 +15,7 @@ from ..services.rig import BodyArrays
 from ..session import session
 from .armature import matrix
 from .binding import carrier, carrying_bone
+from .skinned import deformed, moving_groups
 
 PROBES = 500
 """Vertices whose weights are compared with the stored ones."""
@@ -25,7 +26,7 @@ WEIGHED = 4000
 def find(armature, objects) -> list:
     """The visible meshes that this armature deforms, by name; without those whose faces only come from modifiers."""
     meshes = [o for o in objects if o.type == "MESH" and not o.hide_render and len(o.data.polygons)]
-    return sorted((o for o in meshes if _deformed(o, armature)), key=lambda o: o.name_full)
+    return sorted((o for o in meshes if deformed(o, armature)), key=lambda o: o.name_full)
 
 
 def read(mesh_object, armature) -> BodyArrays:
@@ -58,8 +59,8 @@ def read(mesh_object, armature) -> BodyArrays:
     for modifier in _before_armature(mesh_object):
         if modifier.type == "MIRROR" and modifier.show_render:
             body = _mirrored(body, mesh_object, modifier)
-    if _deformed(mesh_object, armature):
-        return replace(body, groups=_moving(mesh_object, armature))
+    if deformed(mesh_object, armature):
+        return replace(body, groups=moving_groups(mesh_object, armature))
     if (bone := carrying_bone(mesh_object, armature)) is not None:
         rigid = np.array([[i, 0, 1] for i in range(len(body.points))], float)
         return replace(body, groups=(bone,), weights=rigid)
@@ -68,7 +69,7 @@ def read(mesh_object, armature) -> BodyArrays:
 
 def left_behind(mesh_object, armature) -> str:
     """The note on a body that no bone of this armature moves, since it stays with the first bone; empty if one does."""
-    if any(_moving(mesh_object, armature)) or carrying_bone(mesh_object, armature) is not None:
+    if any(moving_groups(mesh_object, armature)) or carrying_bone(mesh_object, armature) is not None:
         return ""
     moving = carrier(mesh_object, None)
     remedy = f"choose {moving.name_full} as the character" if moving not in (None, armature) else "choose another body"
@@ -76,22 +77,6 @@ def left_behind(mesh_object, armature) -> str:
         f"{mesh_object.name_full}: none of its vertex groups belongs to a deforming bone of {armature.name_full}, so hair is not "
         f"kept out of it as it moves; {remedy}"
     )
-
-
-def _moving(mesh_object, armature) -> tuple[str, ...]:
-    """Names of the vertex groups, with an empty name for those that no bone moves."""
-    bones, deformed = armature.data.bones, _deformed(mesh_object, armature)
-
-    def moves(name: str) -> bool:  # a group may have the name of a bone that deforms nothing
-        return name in bones and (bones[name].use_deform or not deformed)
-
-    return tuple(group.name if moves(group.name) else "" for group in mesh_object.vertex_groups)
-
-
-def _deformed(mesh_object, armature) -> bool:
-    if mesh_object.parent == armature and mesh_object.parent_type == "ARMATURE":
-        return True
-    return any(m.type == "ARMATURE" and m.object == armature for m in mesh_object.modifiers)
 
 
 def _before_armature(mesh_object) -> list:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair bones: which bones they are, and their rotations at any time."""
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,22 +20,23 @@ from .motion import Motion
 from .rig import RigArrays
 
 
-def chains_of(character: Character, patterns: str = "", name: str = "skeleton") -> HairChains:
+def chains_of(rig: RigArrays, character: Character, wanted: str = "") -> HairChains:
     """The hair chains of a character.
 
     Args:
+        rig: its armature.
         character: with its body, if that is known.
-        patterns: names of first joints, separated by commas; if empty, chains are found automatically.
-        name: what errors call it.
+        wanted: names of first bones, separated by commas; if empty, chains are found automatically.
 
     Raises:
         NeuralocksError: there are none, or one of them cannot be measured.
     """
-    wanted = [word.strip() for word in patterns.split(",") if word.strip()]
     try:
-        return find_chains(character, _meshes(character), wanted or None)
+        return find_chains(character, _meshes(character), rig.patterns(wanted) or None)
     except NeuralocksError as error:
-        raise type(error)(str(error).replace("skeleton:", f"{name}:", 1)) from None
+        # Joints that the patterns became are not what the artist wrote.
+        text = re.sub("--chains [^:]*:", lambda _: f"--chains {wanted}:", str(error), count=1)
+        raise type(error)(rig.said(text.replace("skeleton:", f"{rig.name}:", 1))) from None
 
 
 def own_turns(own: np.ndarray, motion: Motion, joints: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -73,9 +75,12 @@ class LiveBones:
     def of(cls, model: RigModel, rig: RigArrays, character: Character) -> "LiveBones":
         """Bind a model; the error says why it does not fit this rig."""
         below = character.skeleton.below(character.head)
-        model = replace(model, chains=model.chains.named_as(rig.paths, below))
-        chains = placed_chains(model.chains, character)
-        model.chains.check_same(chains)
+        try:
+            model = replace(model, chains=model.chains.named_as(rig.paths, below))
+            chains = placed_chains(model.chains, character)
+            model.chains.check_same(chains)
+        except NeuralocksError as error:
+            raise type(error)(rig.said(str(error))) from None
         return cls(model, tuple(rig.bones[j] for j in chains.joints), chains.joints, chains)
 
     def follow(self, character: Character, clip: Clip) -> None:

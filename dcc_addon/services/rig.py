@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender rig, read as arrays, as the core's character; and messages about what is wrong with it."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +33,7 @@ class RigArrays:
         parents: (J,) int.
         rest: rest transforms in armature space, (J, 4, 4).
         head_bone: name of the head bone if the artist chose one.
+        skinned: which bones (J,) move skin, if that is known.
     """
 
     name: str
@@ -38,11 +41,30 @@ class RigArrays:
     parents: np.ndarray
     rest: np.ndarray
     head_bone: str = ""
+    skinned: np.ndarray | None = None
 
     @cached_property
     def paths(self) -> list[str]:
         """Joint paths (J)."""
         return names.joint_paths(list(self.bones), list(self.parents))
+
+    @cached_property
+    def _renamed(self) -> dict[str, str]:
+        """Bones by the last parts of their joint paths, those alone that a path cannot call by their names."""
+        pairs = zip((path.rpartition("/")[2] for path in self.paths), self.bones, strict=True)
+        return {joint: bone for joint, bone in pairs if joint != bone}
+
+    def said(self, text: str) -> str:
+        """A line about joints with the names of their bones, such as `hair.01` for `hair_01`."""
+        return re.sub(r"\w+", lambda word: self._renamed.get(word[0], word[0]), text)
+
+    def patterns(self, text: str) -> list[str]:
+        """Patterns of joints from an artist's patterns of bones, separated by commas; a joint's name counts, too."""
+        found = []
+        for word in filter(None, map(str.strip, text.split(","))):
+            hits = [path for path, bone in zip(self.paths, self.bones, strict=True) if fnmatchcase(bone, word)]
+            found += hits or [word]
+        return found
 
     def by_hand(self) -> dict[str, str]:
         """The joint map given by the artist."""
@@ -55,7 +77,7 @@ class RigArrays:
     def named_head(self) -> int | None:
         """The bone that is named like a head, whatever the artist chose; None if there is none."""
         try:
-            return find_humanoid(self.paths, self.parents, self.rest[:, :3, 3])["head"]
+            return self._found({})["head"]
         except NeuralocksError:
             return None
 
@@ -68,11 +90,14 @@ class RigArrays:
         if not self.bones:
             raise NeuralocksError(f"{self.name}: the armature has no bones; choose the armature that moves the body")
         try:
-            return find_humanoid(self.paths, self.parents, self.rest[:, :3, 3], self.by_hand())
+            return self._found(self.by_hand())
         except NeuralocksError:
             if self.head_bone:
                 raise
             raise NeuralocksError(f"{self.name}: no bone is named like a head; choose the head bone") from None
+
+    def _found(self, by_hand: dict[str, str]) -> Humanoid:
+        return find_humanoid(self.paths, self.parents, self.rest[:, :3, 3], by_hand, self.skinned)
 
 
 @dataclass(frozen=True, eq=False)

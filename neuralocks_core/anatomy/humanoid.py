@@ -22,6 +22,10 @@ TRUNK = ("hips", "spine", "chest", "upper_chest", "neck", "head")
 LIMBS = {"arm": ("upper_arm", "lower_arm", "hand"), "leg": ("upper_leg", "lower_leg", "foot")}
 SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part in PARTS)
 BY_HAND = "given by hand"
+SHRUGGED = 0.05
+"""By this share of the trunk's length, a chest's joint may be above the shoulders."""
+COPIED = 1e-4
+"""Joints nearer to each other than this share of the rig's size are in the same place."""
 _SPINE = ("spine", "chest", "torso", "waist", "abdomen")
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 
@@ -74,15 +78,17 @@ class Humanoid(Mapping):
         return next(self.joints[step] for step in way if step in self.joints)
 
 
-def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None = None) -> Humanoid:
+def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None = None, skinned=None) -> Humanoid:
     """Map semantic names to joints.
 
     Args:
         names: joint paths (J), separated by `/`.
         parents: (J,) parent indices, -1 for roots.
-        positions: bind positions (J, 3), which tell the head from other joints on the neck, and limbs that names do not
-            identify.
+        positions: bind positions (J, 3), which tell the head from other joints on the neck, limbs that names do not
+            identify, and copies of the head.
         by_hand: semantic name -> joint path or its last part; overrides what is found.
+        skinned: which joints (J,) move skin, if that is known. A control rig has its head twice: a control, named `head`, from
+            which the trunk is found, and a copy in the same place that moves the skin, and is the head.
 
     Raises:
         NoHead: no joint is named like a head.
@@ -106,13 +112,21 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     for side in ("left", "right"):
         for part, joint in named_limbs(side, sides, keys, parents).items():
             put(f"{side}_{part}", joint, f"by name '{leaf(names[joint])}'")
-    put("head", *_find_head(names, sides, keys, parents, positions))
+    named, reason = _find_head(names, sides, keys, parents, positions)
+    put("head", named, reason)
     if "head" not in joints:
         raise NoHead("skeleton: no joint is named like a head; name it with --head JOINT")
+    others = copies(joints["head"], parents, positions)
+    way = ancestors(named if named in others else joints["head"], parents)
     if positions is not None:
-        _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions)
+        _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions, way)
     _follow_limbs(joints, put, names, keys, parents, positions)
-    _find_trunk(joints, put, names, keys, parents)
+    _find_trunk(joints, put, names, keys, parents, positions, way)
+    if reasons["head"] != BY_HAND and skinned is not None and not skinned[_below(joints["head"], parents)].any():
+        with_skin = [joint for joint in others if skinned[joint]]
+        if with_skin:
+            control, joints["head"] = leaf(names[joints["head"]]), with_skin[0]
+            reasons["head"] = f"moves the skin in the place of the control '{control}'"
     ordered = {name: joints[name] for name in SEMANTIC if name in joints}
     return Humanoid(ordered, {name: reasons[name] for name in ordered})
 
@@ -129,6 +143,16 @@ def named_head(names) -> str | None:
     return names[found["head"]]
 
 
+def copies(joint: int, parents, positions) -> list[int]:
+    """Other joints in the same bind place (J, 3) that are neither above nor below a joint: control rigs have several of a bone."""
+    if positions is None:
+        return []
+    places = np.asarray(positions, float)
+    near = np.linalg.norm(places - places[joint], axis=1) < COPIED * np.ptp(places, axis=0).max()
+    near[ancestors(joint, parents)] = near[_below(joint, parents)] = False
+    return np.flatnonzero(near).tolist()
+
+
 def _follow_limbs(joints, put, names, keys, parents, positions) -> None:
     """Find a limb's unnamed joints below its first joint."""
     for side in ("left", "right"):
@@ -142,11 +166,11 @@ def _follow_limbs(joints, put, names, keys, parents, positions) -> None:
                 put(name, joint, f"below '{leaf(names[begin])}'")
 
 
-def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions) -> None:
+def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions, way) -> None:
     """Find arms if no arm was found by name, and likewise legs."""
     lacking = [limb for limb in LIMBS if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))]
     if lacking:
-        found = limbs_by_shape(ancestors(joints["head"], parents), parents, positions, sides)
+        found = limbs_by_shape(way, parents, positions, sides)
         for name, joint in (each for limb in lacking for each in found.get(limb, {}).items()):
             lower = name.replace("upper", "lower")
             if lower != name and joints.get(lower) == joint and reasons[lower] != BY_HAND:
@@ -187,14 +211,31 @@ def _find_head(names, sides, keys, parents, positions):
     return None, ""
 
 
-def _find_trunk(joints, put, names, keys, parents) -> None:
-    head_way = ancestors(joints["head"], parents)
+def _below(joint: int, parents) -> list[int]:
+    """A joint and all below it."""
+    found = {joint}
+    found.update(other for other, parent in enumerate(parents) if parent in found)  # parents come first
+    return sorted(found)
 
+
+def _under_shoulders(spine: list[int], head: int, shoulders: list[int], positions) -> int:
+    """The joint of a spine, from the head down, nearest the head of those that are not above the shoulders: where necks are numbered
+    like spines, the joints above are the neck.
+    """
+    if positions is None:
+        return spine[0]
+    places = np.asarray(positions, float)
+    up = places[head] - places[spine[-1]]
+    most = places[shoulders].mean(axis=0) @ up + SHRUGGED * up @ up
+    return next((joint for joint in spine if places[joint] @ up <= most), spine[0])
+
+
+def _find_trunk(joints, put, names, keys, parents, positions, head_way) -> None:
     def meet(*others):
         shared = set(head_way)
         for other in others:
             shared &= set(ancestors(other, parents))
-        return next((joint for joint in head_way if joint in shared and joint != joints["head"]), None)
+        return next((joint for joint in head_way if joint in shared and joint != head_way[0]), None)
 
     arms = [joints[n] for n in ("left_upper_arm", "right_upper_arm") if n in joints]
     legs = [joints[n] for n in ("left_upper_leg", "right_upper_leg") if n in joints]
@@ -208,7 +249,11 @@ def _find_trunk(joints, put, names, keys, parents) -> None:
     spine = [joint for joint in head_way[1:] if any(word in keys[joint] for word in _SPINE)]
     if arms and spine and (meeting is None or meeting in head_way[head_way.index(spine[-1]) + 1 :]):
         # Arms parented to the root, as in exports of deform bones only, or to another copy of the trunk.
-        put("upper_chest", spine[0], f"nearest the head, '{leaf(names[spine[0]])}', since the arms hang from elsewhere")
+        sides = [
+            joints.get(name.replace("upper_arm", "shoulder"), joints[name]) for name in joints if "upper_arm" in name
+        ]
+        chest = _under_shoulders(spine, head_way[0], sides, positions)
+        put("upper_chest", chest, f"between the shoulders, '{leaf(names[chest])}', since the arms hang from elsewhere")
     if arms:
         put("upper_chest", meeting, "where the ways from head and arms meet")
     if legs:

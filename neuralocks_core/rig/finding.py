@@ -5,6 +5,7 @@ import fnmatch
 
 import numpy as np
 
+from neuralocks_core.anatomy.humanoid import copies
 from neuralocks_core.anatomy.joint_names import carrier, leaf
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
@@ -136,7 +137,7 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
             "which hang below it"
         )
     if not inside:
-        above, head = carrier(names[character.head], *(names[joint] for joint in hits)), leaf(names[character.head])
+        above, head = _above(character, hits), leaf(names[character.head])
         raise NeuralocksError(
             f"skeleton: joint '{leaf(names[hits[0]])}' does not hang below the head joint '{head}', but from '{above}': name that "
             f"with --head {above}, as in training, or name other joints"
@@ -146,6 +147,15 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
     for joint, parent in enumerate(parents):
         inner[joint] = parent >= 0 and (inner[parent] or parent in hits)
     return [joint for joint in hits if not inner[joint]]
+
+
+def _above(character: Character, joints: list[int]) -> str:
+    """The joint to call the head so that all of these hang below it: a copy of the head if there is one, or what carries both."""
+    skeleton, head = character.skeleton, character.head
+    for copy in copies(head, skeleton.parents, skeleton.bind[:, :3, 3]):
+        if skeleton.below(copy)[joints].all():
+            return leaf(skeleton.names[copy])
+    return carrier(skeleton.names[head], *(skeleton.names[joint] for joint in joints))
 
 
 def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[int]:

@@ -134,15 +134,32 @@ def test_bad_hair_in_plain_words(points, counts, words):
 def test_errors_name_what_the_panel_has(tmp_path):
     """No option or command of a terminal, whatever the names of the chains."""
     skeleton = Skeleton(BONES, PARENTS, rest())
-    character = Character(skeleton, None, rig.RigArrays("Rig", BONES, PARENTS, rest()).humanoid())
+    arrays = rig.RigArrays("Rig", BONES, PARENTS, rest())
+    character = Character(skeleton, None, arrays.humanoid())
     for patterns in ("", "curl*", "spine", "head"):
         with pytest.raises(NeuralocksError) as error:
-            bones.chains_of(character, patterns, "Rig")
+            bones.chains_of(arrays, character, patterns)
         assert "--" in str(error.value) and "skeleton:" not in str(error.value)
         assert "--" not in (said := panel_errors.for_the_panel(str(error.value))) and "neuralocks " not in said, said
     with pytest.raises(NeuralocksError) as error:
         model.read(tmp_path / "nowhere.neuralocks", "strands")
     assert "--" not in panel_errors.for_the_panel(str(error.value))
+
+
+def test_hair_bones_have_the_names_that_blender_shows():
+    """In *Chains*, with wildcards or as a file has them, and in errors."""
+    names, parents = ("spine", "head", "hair.01", "hair.02", "Pony Tail"), np.array([-1, 0, 1, 2, 1])
+    places = np.tile(np.eye(4), (5, 1, 1))
+    places[:, 1, 3] = [1.2, 1.6, 1.7, 1.8, 1.75]
+    arrays = rig.RigArrays("Rig", names, parents, places)
+    character = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid())
+    for wanted in ("hair.01", "hair.*", "hair_01", " hair.01 ,"):
+        found = bones.chains_of(arrays, character, wanted)
+        assert [arrays.bones[joint] for joint in found.joints] == ["hair.01"], wanted  # hair.02 is its free end
+    with pytest.raises(NeuralocksError, match="^--chains hair.09, spine.1: no joint has such a name"):
+        bones.chains_of(arrays, character, "hair.09, spine.1")
+    with pytest.raises(NeuralocksError, match="'Pony Tail'"):
+        bones.chains_of(arrays, character, "Pony Tail")
 
 
 def test_card_fits_a_sidebar():

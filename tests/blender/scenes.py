@@ -174,7 +174,8 @@ def rig_model(rig, path):
     from neuralocks_core.rig import rig_spec
     from tests.rig_models import random_rig_model
 
-    made = random_rig_model(chains_of(session.rigs[rig.name].character), rig_spec(True), gain=3.0)
+    sampled = session.rigs[rig.name]
+    made = random_rig_model(chains_of(sampled.rig, sampled.character), rig_spec(True), gain=3.0)
     with patch("neuralocks_core.rig.graph.rig_graph", return_value=b"unused"):
         return made.save(path)
 

@@ -98,7 +98,7 @@ def bake(
     known = known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins)
     notes = [
         *(note for note in known if note not in untrue),
-        *model_notes(strand_model, look, shot),
+        *model_notes(strand_model, look, shot, strength),
     ]
     how = {"together": True, "velocities": velocities, "progress": progress}
     return write_told(notes, tell, began, shot, out, codes, poser, inputs | options, facts, **how)

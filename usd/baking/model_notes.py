@@ -4,23 +4,29 @@
 from dataclasses import replace
 
 from neuralocks_core.materials import Material
+from neuralocks_core.model import shipped
 from neuralocks_core.runtime import StrandModel
 
-from ..shot.attach import off_head
+from ..shot.attach import Attachment, off_head
 from ..shot.character_notes import untrained
+from ..shot.notes import without_strength
 from ..shot.stage import Shot
+from ..skel.stage_rig import StageRig
 
 
-def model_notes(model: StrandModel, material: Material, shot: Shot) -> list[str]:
-    """What a user of a model should know: its report, and how material and characters differ from what it learned."""
-    return [*_unheard(model, material), *_other_bodies(model, shot), *model.file.shortcomings()]
+def model_notes(model: StrandModel, material: Material, shot: Shot, strength: float = 1.0) -> list[str]:
+    """What a user of a model should know: its report, how material and characters differ from what it learned, and whether motion
+    strength acts.
+    """
+    unmoved = without_strength(strength, model.meta.get("static") is not True)
+    return [*_unheard(model, material), *unmoved, *_other_bodies(model, shot), *model.file.shortcomings()]
 
 
 def learned(model: StrandModel, shot: Shot) -> list[str]:
     """Those of a shot's notes that do not hold for a model: of characters whose measures it was trained on."""
     found = [item.attachment for item in shot.grooms if not off_head(item.attachment)]
     known = [each for each in found if model.knows(each.character, each.rig.clip)]
-    return [note for each in known for note in untrained(replace(each.rig, character=each.character))]
+    return [note for each in known for note in untrained(_with_head(each))]
 
 
 def _unheard(model: StrandModel, material: Material) -> list[str]:
@@ -40,10 +46,18 @@ def _other_bodies(model: StrandModel, shot: Shot) -> list[str]:
     """The notes on characters whose measures differ from those that a model was trained on."""
     found = [item.attachment for item in shot.grooms]
     on_heads = {each.rig.path: each for each in found if not off_head(each)}  # a chest does not have a head's measures
+    own, remedy = model.file.path == shipped("strands"), "use the shipped model, or train one on this character"
+    if own:  # of those whose size no model knows, the shot's notes tell
+        on_heads = {path: each for path, each in on_heads.items() if not untrained(_with_head(each))}
+        remedy = "train one on this character"
     told = {path: model.another_body(each.character, each.rig.clip) for path, each in on_heads.items()}
     return [
-        f"{path}: the model was trained on another body: {fact}; if hair moves oddly or lies in the body, use the shipped model, "
-        "or train one on this character"
+        f"{path}: the model was trained on another body: {fact}; if hair moves oddly or lies in the body, {remedy}"
         for path, fact in told.items()
         if fact
     ]
+
+
+def _with_head(found: Attachment) -> StageRig:
+    """The rig with the head that carries the hair."""
+    return replace(found.rig, character=found.character)

@@ -94,9 +94,10 @@ def given_cuts(cuts, loop: bool = False) -> list[float] | None:
 
 
 def _whole_range(first: float, last: float, frame: float) -> tuple[float, float, float]:
-    """First and last time code of a shot's frames, and from one to the next."""
-    # If a time code is a frame, frames are whole numbers; otherwise the shot begins with a frame.
-    begin = float(math.ceil(first - 1e-9)) if frame == 1 else first
+    """First and last time code of a shot's frames, and from one to the next: players show the first and count from there, also if it
+    is no whole number.
+    """
+    begin = float(round(first)) if frame == 1 and abs(first - round(first)) < NEAR else first
     return begin, max(last, begin), frame
 
 

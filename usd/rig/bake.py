@@ -19,7 +19,7 @@ from ..border.damage import names_damage
 from ..border.stage_files import check_layer_name, check_not_over
 from ..border.stopping import check
 from ..border.time_codes import given_cuts
-from ..shot.notes import asked_notes, left_out, out_of_place
+from ..shot.notes import asked_notes, left_out, out_of_place, without_strength
 from ..shot.stage import check_cuts
 from ..shot.wind import as_wind, in_core, wind_facts
 from .bound import BoundHair
@@ -119,8 +119,7 @@ def bake_rig(
     for one in bound:
         notes += one.notes(loop, find_cuts=cuts is None)
         notes += asked_notes(stage, [one.hair.source], one.wanted, loop)
-    if strength != 1 and not model.dynamic:
-        notes.append("motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model")
+    notes += without_strength(strength, model.dynamic)
     notes = list(dict.fromkeys(notes))
     if tell:
         tell(notes)

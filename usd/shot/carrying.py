@@ -11,6 +11,7 @@ from neuralocks_core.character import Character
 
 from ..border.placement import Placement
 from ..skel.stage_rig import StageRig
+from ..skel.surface import moved_joints
 from .seat import some_places
 
 STILL = 1e-4
@@ -25,7 +26,7 @@ def carrying_joint(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tu
     best = int(shares.argmax())
     head = rig.character.humanoid.get("head")
     if head is not None and best != head:
-        below = rig.character.skeleton.below(head)
+        below = rig.character.of_head
         single = shares[best] > (0.95 if exact else 0.8)
         if below[best] and (not single or _rides_along(rig, best, head)) or not single and shares[below].sum() > 0.5:
             return head, f"joint '{names[head]}'"
@@ -42,7 +43,7 @@ def followed_joint(rig: StageRig, placement: Placement) -> tuple[int, np.ndarray
     rows, places = some_places(rig, placement)
     if not len(rows):
         return None
-    below, joints = character.skeleton.below(head), rig.clip.joints[rows]
+    below, joints = character.of_head, rig.clip.joints[rows]
     if _still(places) or any(_still(np.linalg.inv(joints[:, joint]) @ places) for joint in np.flatnonzero(~below)):
         return None
     for joint in np.flatnonzero(below):  # parents come first
@@ -72,7 +73,7 @@ def carried_by(rig: StageRig, joint: int) -> Character:
     head, skeleton = rig.character.humanoid.get("head"), rig.character.skeleton
     if head == joint:
         return rig.character
-    below = head is not None and skeleton.below(head)[joint]
+    below = head is not None and rig.character.of_head[joint]
     # If the user calls the neck the head, the head found by name does not become a part of it.
     if below and not ("head" in rig.by_hand and joint == head_by_name(rig)):
         return replace(rig.character, carrier=joint)
@@ -83,11 +84,7 @@ def spread_over(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> lis
     """The note on hair that one joint cannot carry: fur all over a body."""
     names = [leaf(name) for name in rig.source.names]
     # Joints below a head are its face; joints below a spine are everything.
-    own = (
-        rig.character.skeleton.below(joint)
-        if joint == rig.character.humanoid.get("head")
-        else np.arange(len(names)) == joint
-    )
+    own = rig.character.of_head if joint == rig.character.humanoid.get("head") else np.arange(len(names)) == joint
     share = shares[own].sum()
     if share >= MOST:
         return []
@@ -117,4 +114,5 @@ def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
 def _humanoid(rig: StageRig, **head: str) -> Humanoid:
     skeleton = rig.character.skeleton
     by_hand = {name: joint for name, joint in rig.by_hand.items() if name != "head"} | head
-    return find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand)
+    skinned = moved_joints(rig.meshes, len(skeleton.names))
+    return find_humanoid(skeleton.names, skeleton.parents, skeleton.bind[:, :3, 3], by_hand, skinned)

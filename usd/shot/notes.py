@@ -252,3 +252,10 @@ def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
         f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, {much} within {first:g} to "
         f"{last:g}: {held}; check --frames, the shot's range and the layer offsets"
     ]
+
+
+def without_strength(strength: float, dynamic: bool) -> list[str]:
+    """The note on a motion strength that a model of held poses does not feel."""
+    if strength == 1 or dynamic:
+        return []
+    return ["motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model"]

@@ -75,7 +75,7 @@ def _turned_round(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> float:
     vertices = cKDTree(body.points)
     on_head = np.zeros(len(body.points))
     if head is not None:
-        on_head = (body.joint_weights * rig.character.skeleton.below(head)[body.joint_indices]).sum(axis=1)
+        on_head = (body.joint_weights * rig.character.of_head[body.joint_indices]).sum(axis=1)
 
     def told(last: bool) -> tuple[float, float]:
         """Distance [m] and share on the head; roots that begin inside of skin are on it."""

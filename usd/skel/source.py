@@ -20,7 +20,7 @@ from .clip_codes import clip_codes
 from .joints import JointSource
 from .rig_copy import alike, hair_of, source_of
 from .stage_rig import StageRig, joint_trim
-from .surface import Skins, bound_meshes, find_skins, merged_body, not_posed
+from .surface import Skins, bound_meshes, find_skins, merged_body, moved_joints, not_posed
 
 COMPARED = 100
 """About this many poses of a rig bake are compared with those that it was made from."""
@@ -66,7 +66,7 @@ def read_rig(
     notes += not_posed(meshes, source)
     by_hand = {**(joints or {}), **({"head": head} if head else {})}
     try:
-        humanoid = _humanoid(source, by_hand)
+        humanoid = _humanoid(source, by_hand, moved_joints(meshes, len(source.names)))
     except NoHead:
         if not headless:
             raise
@@ -131,9 +131,9 @@ def _old_copy(source: JointSource, time_codes: np.ndarray) -> list[str]:
     return [f"{fact}; {'what that shows is read' if source.copied else 'bake the rig again'}"]
 
 
-def _humanoid(source: JointSource, by_hand: dict[str, str]) -> Humanoid:
+def _humanoid(source: JointSource, by_hand: dict[str, str], skinned: np.ndarray) -> Humanoid:
     try:
-        return find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand)
+        return find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand, skinned)
     except NeuralocksError as error:
         raise type(error)(f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None
 

@@ -75,11 +75,18 @@ def bound_meshes(skins: Skins, source: JointSource, notes: list[str]) -> list[St
 
 
 def not_posed(meshes: list[StageMesh], source: JointSource) -> list[str]:
-    """The note on meshes that USD draws as they were made, whatever their skeleton does, because they have no SkelRoot above."""
+    """The notes on meshes that USD draws as they were made, whatever their skeleton does, because they have no SkelRoot above, or
+    because the schema of their binding is not applied.
+    """
+    unapplied = [mesh.prim for mesh in meshes if not UsdSkel.BindingAPI(mesh.prim).GetInheritedSkeleton()]
+    if unapplied:
+        return [
+            f"{source.path}: SkelBindingAPI is not applied to {_first(unapplied)}, so USD draws it as modelled, whatever the "
+            "skeleton does; add it to the apiSchemas of what has the skel:skeleton"
+        ]
     outside = [mesh.prim for mesh in meshes if not any(above.IsA(UsdSkel.Root) for above in _lineage(mesh.prim))]
     if not outside:
         return []
-    others = f" and {len(outside) - 1} more" if len(outside) > 1 else ""
     typed = ((above, spec.typeName) for above in _lineage(outside[0]) for spec in above.GetPrimStack())
     # A reference to a SkelRoot on a prim that is defined with a type of its own.
     hidden = next((above for above, name in typed if name == "SkelRoot"), None)
@@ -89,8 +96,20 @@ def not_posed(meshes: list[StageMesh], source: JointSource) -> list[str]:
         kind = hidden.GetTypeName()
         remedy = f"{hidden.GetPath()} is one below a stronger opinion that types it {kind}: type it SkelRoot there"
     return [
-        f"{source.path}: no SkelRoot is above {outside[0].GetPath()}{others}, so USD draws it as modelled, whatever the skeleton does; {remedy}"
+        f"{source.path}: no SkelRoot is above {_first(outside)}, so USD draws it as modelled, whatever the skeleton does; {remedy}"
     ]
+
+
+def moved_joints(meshes: list[StageMesh], count: int) -> np.ndarray:
+    """Which of a skeleton's joints (J,) bool move any vertex."""
+    result = np.zeros(count, bool)
+    for mesh in meshes:
+        result[mesh.indices[mesh.weights > 0]] = True
+    return result
+
+
+def _first(prims: list[Usd.Prim]) -> str:
+    return f"{prims[0].GetPath()} and {len(prims) - 1} more" if prims[1:] else str(prims[0].GetPath())
 
 
 def drawn(prim: Usd.Prim) -> bool:

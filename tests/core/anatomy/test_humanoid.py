@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core.anatomy.humanoid import find_humanoid
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from tests.core.anatomy.common_rigs import RIGS
 
@@ -86,3 +87,68 @@ def test_missing_joints_fall_back_towards_the_trunk():
     humanoid = find_humanoid(paths, parents)
     wanted = {"left_lower_arm": "upper_arm_L", "right_lower_arm": "spine", "right_shoulder": "spine", "neck": "head"}
     assert {name: paths[humanoid.nearest(name)].rpartition("/")[2] for name in wanted} == wanted
+
+
+CONTROLS = (
+    "torso\n spine_fk\n  neck\n   head\n  ORG_neck\n   ORG_head\n    ORG_face\n     DEF_jaw\n  ORG_arm_L\n  ORG_arm_R\n"
+    "root\n DEF_spine\n  DEF_chest\n   DEF_neck\n    DEF_head"
+)
+"""A control rig: `head` is a control; copies of it in the same place carry the face and move the skin."""
+HEIGHTS = {
+    "torso": 1.0,
+    "root": 0.0,
+    "spine": 1.0,
+    "fk": 1.3,
+    "chest": 1.3,
+    "neck": 1.5,
+    "head": 1.6,
+    "face": 1.6,
+    "jaw": 1.62,
+}
+
+
+def control_rig():
+    paths, parents = rig(CONTROLS)
+    leaves = [path.rpartition("/")[2] for path in paths]
+    places = np.array([(0.0, HEIGHTS.get(name.split("_")[-1], 1.4), 0.0) for name in leaves])
+    places[:, 0] = [0.2 * (name.endswith("_L") - name.endswith("_R")) for name in leaves]
+    return paths, parents, places, np.array([name.startswith("DEF") for name in leaves]), leaves
+
+
+@pytest.mark.parametrize("by_hand", [{}, {"head": "DEF_head"}, {"head": "ORG_head"}])
+def test_the_head_of_a_control_rig_is_the_copy_that_moves_the_skin(by_hand):
+    """Whichever copy is the head, the trunk is that of the control, which the copy follows by constraints alone."""
+    paths, parents, places, skinned, leaves = control_rig()
+    found = find_humanoid(paths, parents, places, by_hand, skinned)
+    named = {meaning: leaves[joint] for meaning, joint in found.items()}
+    assert named["head"] == by_hand.get("head", "DEF_head")
+    assert (named["neck"], named["upper_chest"], named["hips"]) == ("neck", "spine_fk", "torso")
+    assert leaves[find_humanoid(paths, parents, places)["head"]] == "head", "without skin, the name decides"
+    skinned[leaves.index("head")] = True
+    assert leaves[find_humanoid(paths, parents, places, {}, skinned)["head"]] == "head", (
+        "a head with skin needs no copy"
+    )
+
+
+def test_a_face_that_hangs_from_a_copy_of_the_head_is_on_the_head():
+    paths, parents, places, skinned, leaves = control_rig()
+    bind = np.tile(np.eye(4), (len(paths), 1, 1))
+    bind[:, :3, 3] = places
+    character = Character(
+        Skeleton(paths, np.array(parents), bind), None, find_humanoid(paths, parents, places, {}, skinned)
+    )
+    of_head = {name for name, on in zip(leaves, character.of_head) if on}
+    assert of_head == {"head", "ORG_head", "ORG_face", "DEF_jaw", "DEF_head"}
+
+
+def test_a_neck_numbered_like_the_spine_begins_above_the_shoulders():
+    """Blender exports deforming bones alone, and the arms of a Rigify rig then hang from nothing."""
+    paths, parents = rig(
+        "DEF_spine\n DEF_spine_001\n  DEF_spine_002\n   DEF_spine_003\n    DEF_spine_004\n     DEF_spine_005\n"
+        "      DEF_spine_006\nDEF_shoulder_L\n DEF_upper_arm_L\nDEF_shoulder_R\n DEF_upper_arm_R"
+    )
+    heights = [1.01, 1.157, 1.293, 1.466, 1.658, 1.72, 1.781, 1.605, 1.585, 1.605, 1.585]
+    sides = [0, 0, 0, 0, 0, 0, 0, 0.02, 0.19, -0.02, -0.19]
+    found = find_humanoid(paths, parents, np.column_stack([sides, heights, np.zeros(11)]))
+    named = {meaning: paths[joint].rpartition("_")[2] for meaning, joint in found.items()}
+    assert (named["head"], named["neck"], named["upper_chest"], named["chest"]) == ("006", "004", "003", "002")
