@@ -228,7 +228,8 @@ class Character:
         """Which body vertices (V,) are the character's own, not what it wears; all if that is unknown."""
         if self.body is None:
             return None
-        return own_skin(self.body.points, self.body.triangles, self.on_head, HEAD_WIDTHS[0])
+        on_joint = np.sum(self.body.joint_weights * (self.body.joint_indices == self.head), axis=1) > 0.5
+        return own_skin(self.body.points, self.body.triangles, self.on_head, on_joint, HEAD_WIDTHS[0])
 
     @cached_property
     def head_skin(self) -> np.ndarray | None:

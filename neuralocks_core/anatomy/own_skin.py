@@ -9,15 +9,19 @@ WELDED = 1e-4
 """Points this close [m] count as one: files split a skin along texture seams and between meshes."""
 
 
-def own_skin(points: np.ndarray, triangles: np.ndarray, on_head: np.ndarray, least: float) -> np.ndarray:
-    """Which vertices (V,) bool belong to a piece that continues from the head into neck or trunk; all if there is no such piece.
+def own_skin(
+    points: np.ndarray, triangles: np.ndarray, on_head: np.ndarray, on_joint: np.ndarray, least: float
+) -> np.ndarray:
+    """Which vertices (V,) bool belong to a piece that continues from the head into neck or trunk. If there is none, as on a robot, all
+    but pieces that move mainly with joints below the head's, such as pigtails, unless these are all of the head.
 
     Hats, horns, glasses, eyes and hair on joints of its own move only with the head, backpacks and boots without it. Hair cards,
     scarves and ribbons may continue into the neck, but are not as large as a head along every axis. A hood is, and counts as skin.
 
     Args:
         points: (V, 3) [m]; triangles: (F, 3).
-        on_head: which vertices (V,) move mainly with the head.
+        on_head: which vertices (V,) move mainly with the head or joints below it.
+        on_joint: which vertices (V,) move mainly with the head's own joint.
         least: size of the smallest head, along each axis [m].
     """
     # One integer per place: many times faster to sort than triples, and unique within 100 m.
@@ -31,4 +35,10 @@ def own_skin(points: np.ndarray, triangles: np.ndarray, on_head: np.ndarray, lea
     large = (-high - low).min(axis=1) >= least
     goes_on = np.bincount(piece[~on_head], minlength=len(low)) > 0
     own = large & goes_on
+    if not own.any():
+        heads, below = (
+            np.bincount(piece[mask], minlength=len(low)) > 0.5 * np.bincount(piece, minlength=len(low))
+            for mask in (on_joint, on_head & ~on_joint)
+        )
+        own = ~below if (large & heads).any() else own
     return own[piece] if own.any() else np.ones(len(points), bool)

@@ -16,10 +16,8 @@ from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 UNNAMED = 3
 """A row of this many joints that drive skin below a head may be hair, whatever their names."""
-CAP = 0.7
-"""Share of the head's width and depth that skin must cover to be a cap."""
-
-
+CAP, ASIDE = 0.7, 0.4
+"""Share of the skull's width that skin must cover both ways to be a cap, and by which its middle may be off the skull's."""
 FAN = 3
 """Least number of chains below one joint: fewer may be one branching chain."""
 
@@ -136,6 +134,12 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
             f"--chains {' '.join(patterns)}: joint '{leaf(names[character.head])}' is the head; name the first joints of the hair, "
             "which hang below it"
         )
+    over = [joint for joint in hits if character.skeleton.below(joint)[character.head]]
+    if not inside and over:
+        raise NeuralocksError(
+            f"--chains {' '.join(patterns)}: joint '{leaf(names[over[0]])}' carries the head; name the first joints of the hair, which "
+            f"hang below '{leaf(names[character.head])}'"
+        )
     if not inside:
         above, head = _above(character, hits), leaf(names[character.head])
         raise NeuralocksError(
@@ -209,14 +213,30 @@ def _only_shares(skeleton: Skeleton, joint: int, used: np.ndarray, meshes: list[
 
 
 def _is_cap(character: Character, joint: int, meshes: list[SkinnedMesh]) -> bool:
-    """Whether a joint drives the hair on top of the skull: skin nearly as wide and as deep as the head's own. If it turned, it
-    would go through the forehead; the joints below it move.
+    """Whether a joint drives the hair on the skull: skin around its middle, nearly as wide and as deep as it is wide. If it turned,
+    it would slide over the skull and go through it; the joints below it move.
     """
-    sizes = []
-    for owner in (joint, character.head):
-        only = np.arange(len(character.skeleton.names)) == owner
-        points = np.concatenate([mesh.points[mesh.weight_on(only) > 0.5] for mesh in meshes])
-        if len(points) < 8:
-            return False
-        sizes.append(np.ptp(character.canonical(points)[:, [0, 2]], axis=0))
-    return bool((sizes[0] > CAP * sizes[1]).all())
+    points, skull = _driven(character, joint, meshes), _skull(character, meshes)
+    if min(len(points), len(skull)) < 8:
+        return False
+    low, high = skull.min(axis=0), skull.max(axis=0)
+    width = (high - low).min()  # without ears, or without a nose
+    off = np.abs((points.min(axis=0) + points.max(axis=0) - low - high) / 2)
+    return bool((np.ptp(points, axis=0) > CAP * width).all() and (off < ASIDE * width).all())
+
+
+def _skull(character: Character, meshes: list[SkinnedMesh]) -> np.ndarray:
+    """Where the upper half of the head's own skin is, seen from above (n, 2) [m]: without hats, bows and hair on joints of its own."""
+    body, head = character.body, character.head
+    if body is None:
+        return _driven(character, head, meshes)
+    on_head = np.sum(body.joint_weights * (body.joint_indices == head), axis=1) > 0.5
+    points = character.canonical(body.points[on_head & character.skin])
+    return points[points[:, 1] > points[:, 1].max(initial=0.0) / 2][:, [0, 2]]
+
+
+def _driven(character: Character, joint: int, meshes: list[SkinnedMesh]) -> np.ndarray:
+    """Where the vertices that mainly follow a joint are, seen from above (n, 2) [m]."""
+    only = np.arange(len(character.skeleton.names)) == joint
+    points = np.concatenate([mesh.points[mesh.weight_on(only) > 0.5] for mesh in meshes])
+    return character.canonical(points)[:, [0, 2]]

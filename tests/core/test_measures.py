@@ -87,6 +87,20 @@ def test_an_elfs_ears_do_not_lower_the_middle_of_its_head():
     assert np.abs(after.head_centre - before.head_centre).max() < 0.015
 
 
+def test_pigtails_on_joints_of_their_own_do_not_widen_a_robots_head():
+    """The head is connected to nothing, so that its own skin cannot be told by what it continues into."""
+    head, trunk = _ball([0, 1.68, 0.02], 0.1, HEAD), _ball([0, 1.3, 0], 0.15, SPINE)
+    bare = _dressed(head, trunk)
+    skeleton = Skeleton(
+        (*bare.skeleton.names, "tail"),
+        np.append(bare.skeleton.parents, HEAD),
+        bare.skeleton.bind[[*range(len(bare.skeleton.names)), HEAD]],
+    )
+    pigtails = [_ball([x, 1.7, 0], 0.15, len(bare.skeleton.names)) for x in (-0.4, 0.4)]
+    who = replace(_dressed(head, trunk, *pigtails), skeleton=skeleton, humanoid=bare.humanoid)
+    assert who.head_width == bare.head_width < 0.21 and who.skin.sum() == bare.skin.sum()
+
+
 @pytest.mark.parametrize("worn", WORN)
 def test_where_skin_cannot_be_told_every_mesh_counts(worn):
     """A head that is connected to nothing may as well be a hat."""

@@ -14,6 +14,7 @@ from neuralocks_core.rig.network import RigModel
 from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
+from ..shot.character_notes import lies_down
 from ..shot.notes import not_animated, on_twos, without_turn
 from ..shot.stage import check_frames_named, frame_range
 from .layer import kept_hair
@@ -54,7 +55,10 @@ class BoundHair:
         here, trained_name = hair.rig.chains, model.chains.names[0]
         if here.names != model.chains.names:
             model = replace(model, chains=replace(model.chains, names=here.names))
-        size = model.chains.check_same(here)
+        try:
+            size = model.chains.check_same(here)
+        except NeuralocksError as error:
+            raise NeuralocksError("; ".join([str(error), *_likelier(hair, model)])) from None
         if stops := without_turn(hair.source, model.spec.pose_joints):
             raise NeuralocksError(stops[0])
         first, last = frame_range(hair.stage, [hair.source])
@@ -150,6 +154,16 @@ class BoundHair:
             f"{self.hair.source.source.path}: is {self.size:.2f} times as large as the character that the model was trained for; its "
             "hair swings as fast as that one's"
         ]
+
+
+def _likelier(hair: RiggedHair, model: RigModel) -> list[str]:
+    """What more likely explains that a model does not fit than another rig: a character that lies, or another head joint."""
+    source, reads = hair.source, model.training.get("reads")
+    trained = reads.get("head") if isinstance(reads, dict) else None
+    head = leaf(source.source.names[source.character.head])
+    if isinstance(trained, str) and trained != head and trained in map(leaf, source.source.names):
+        return [f"but in training the head was '{trained}', and here it is '{head}': check --head first"]
+    return [f"but first: {note}" for note in lies_down(source)]
 
 
 def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:

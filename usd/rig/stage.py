@@ -16,6 +16,7 @@ from neuralocks_core.rig.measuring import UNEVEN, placed_chains
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
+from ..border.amounts import check_names
 from ..border.damage import names_damage
 from ..border.prim_paths import prim_path
 from ..border.stage_files import open_stage
@@ -115,6 +116,7 @@ def read_rigged_hairs(
         NoHairChains: there is no joint of the model's chains.
         NeuralocksError: there is no such skeleton, or its hair chains cannot be used; the message names prim or joint.
     """
+    check_names("--chains", chains)
     stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
     border = Border.of(stage)
     prims = find_skeletons(stage)

@@ -64,7 +64,7 @@ def train_rig(
             missing.
     """
     material = material or {}
-    _check_amounts(dynamic, seconds, steps, hidden, clips, material)
+    _check_amounts(dynamic, seconds, steps, hidden, clips, seed, material)
     check_training()
     from neuralocks_core.rig.rods import RigMaterial
 
@@ -123,7 +123,7 @@ def _card(who: Character, model, name: str) -> dict:
     }
 
 
-def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict) -> None:
+def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, seed, material: dict) -> None:
     """Refuse numbers that no training can use; None stands for a default."""
     if not dynamic and (clips is not None or "damping" in material):
         raise NeuralocksError("--clips, --damping: have no effect on held poses; leave out --quasi-static")
@@ -132,6 +132,7 @@ def _check_amounts(dynamic: bool, seconds, steps, hidden, clips, material: dict)
         ("steps", steps, 1, 10_000_000, True),
         ("hidden", hidden, 1, 256, True),
         ("clips", clips, 2, 10_000, True),
+        ("seed", seed, 0, 2**32 - 1, True),
         *((name, material.get(name), LOWEST, HIGHEST, False) for name in ("bend", "weight", "damping")),
     ):
         if value is not None:

@@ -13,6 +13,7 @@ from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 
+from ..border.amounts import joints_by_hand
 from ..border.units import Border
 from .bind_world import to_bind_world
 from .blend_shapes import knot_weights, shares
@@ -64,7 +65,7 @@ def read_rig(
     posed = source.posed(time_codes)
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
     notes += not_posed(meshes, source)
-    by_hand = {**(joints or {}), **({"head": head} if head else {})}
+    by_hand = joints_by_hand(head, joints)
     try:
         humanoid = _humanoid(source, by_hand, moved_joints(meshes, len(source.names)))
     except NoHead:

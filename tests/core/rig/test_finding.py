@@ -157,6 +157,19 @@ def test_a_joint_that_drives_the_cap_of_the_hair_is_no_bone():
     assert find_chains(who, [head, tails, _ring(who, "Hair", 0.2)]).names == ("Hair", "Hair_1", "Hair_2")
 
 
+def test_a_cap_may_leave_the_forehead_free_and_ears_stand_out():
+    """Both are narrower than the head's box; a bun as large as that, behind the head, is a hair bone."""
+    who = character([("Hair", "head", (0, 1.6, 0)), *tail("Hair", 3, parent="Hair")])
+    tails = skin(who, {"Hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "Hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})
+    head, cap = _ring(who, "head"), _ring(who, "Hair")
+    back = replace(cap, points=np.minimum(cap.points, (1, 9, 0.05)))
+    ears = replace(head, points=head.points * np.where(np.abs(head.points[:, :1]) > 0.08, (2, 1, 1), 1))
+    assert find_chains(who, [head, tails, back]).names == ("Hair_1", "Hair_2")
+    assert find_chains(who, [ears, tails, cap]).names == ("Hair_1", "Hair_2")
+    bun = replace(cap, points=0.8 * cap.points + [0, 0.3, -0.18])
+    assert find_chains(who, [head, tails, bun]).names == ("Hair", "Hair_1", "Hair_2")
+
+
 @pytest.mark.parametrize("share", [0.5, 0.01])
 def test_a_holder_that_smoothed_weights_give_a_share_of_the_roots_is_no_bone(share):
     """One stroke of a smoothing brush must not make a hairdo one chain that swings over the skull."""

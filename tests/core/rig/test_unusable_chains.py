@@ -19,7 +19,11 @@ from tests.core.rig.builders import character, skin, tail
         ([], None, "no hair chains"),
         (tail("hair", 3, step=(0, 0, 0)), None, "has no length"),
         (tail("hair", 2), ["nothing*"], "no joint has such a name"),
-        (tail("hair", 2), ["chest"], "'chest' does not hang below the head joint 'head', but from 'hips'"),
+        (
+            tail("hair", 2),
+            ["chest"],
+            "joint 'chest' carries the head; name the first joints of the hair, which hang below 'head'",
+        ),
         (tail("hair", 2), ["head"], "joint 'head' is the head; name the first joints of the hair"),
     ],
 )

@@ -79,3 +79,22 @@ def test_a_material_that_was_never_learned_is_told(model, shot):
     assert model_notes(one, Material(clumping=0.5), shot) == [] == model_notes(one, Material(), shot)
     (note,) = model_notes(one, replace(Material(), weight=2 * Material.weight), shot)
     assert "stiffness, weight and damping change nothing" in note
+
+
+def test_the_shipped_model_does_not_advise_itself(shot):
+    """Of a body that no model knows, the shot's notes tell; of others, training helps."""
+    plain = StrandModel.load()
+    changed = _learned(shot, highest={0: 0.05}, lowest={0: 0.04})
+    one = StrandModel(replace(plain.file, meta=plain.meta | {"training": changed}))
+    (note,) = model_notes(one, Material(), shot)
+    assert note.endswith("if hair moves oddly or lies in the body, train one on this character")
+    (note,) = _notes(plain.file.path, shot, changed)
+    assert note.endswith("train one on this character") and "use the shipped" not in note
+
+
+def test_strength_that_a_model_of_held_poses_does_not_feel_is_told(model, shot):
+    plain = StrandModel.load(model).file
+    still, moving = (StrandModel(replace(plain, meta=plain.meta | {"static": static})) for static in (True, False))
+    (note,) = model_notes(still, Material(), shot, strength=2.0)
+    assert note.startswith("motion strength: has no effect on a model of held poses")
+    assert model_notes(still, Material(), shot) == [] == model_notes(moving, Material(), shot, strength=2.0)

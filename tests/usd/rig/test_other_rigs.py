@@ -29,6 +29,35 @@ def test_a_model_for_another_rig_is_refused(tmp_path):
         bake_rig(shot, tmp_path / "out.usda", model)
 
 
+def test_the_likelier_cause_is_told_before_a_training(tmp_path):
+    """Another head joint than in training, and a character that lies down, are no other rigs."""
+    with pytest.raises(
+        NeuralocksError, match="mm away.*in training the head was 'head', and here it is 'neck_01': check --head"
+    ):
+        bake_rig(EXAMPLE / "shot.usda", tmp_path / "out.usda", None, head="neck_01")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "lying.usda"))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    stage.DefinePrim("/Who").GetReferences().AddReference(str(EXAMPLE / "shot.usda"), "/Body")
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="mm away.*but first: /Who/Rig: lies down"):
+        bake_rig(tmp_path / "lying.usda", tmp_path / "out.usda", None, frames="1:2")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"head": 5}, "--head 5: must be a joint's name"),
+        ({"joints": {"neck": 5}}, "--joint neck 5: must be a joint's name"),
+        ({"joints": ["neck"]}, r"--joint \['neck'\]: must be a dict"),
+    ],
+)
+def test_what_is_no_name_of_a_joint_is_refused(tmp_path, given, words):
+    with pytest.raises(NeuralocksError, match=words):
+        bake_rig(EXAMPLE / "shot.usda", tmp_path / "out.usda", None, **given)
+    with pytest.raises(NeuralocksError, match="--chains 'Hair\\*': must be a list of names"):
+        read_rigged_hair(EXAMPLE / "shot.usda", chains="Hair*")
+
+
 @pytest.mark.parametrize("without", ["hidden", "inactive", "coarse"])
 def test_the_hairs_mesh_need_not_be_there(tmp_path, without):
     """A model knows its joints: hidden hair, a stage with only animation, and a level of detail whose last joints move nothing are

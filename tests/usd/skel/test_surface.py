@@ -119,6 +119,11 @@ def test_a_body_that_usd_leaves_where_it_was_made_is_told(tmp_path):
         layer.Save()
         (note,) = told(layer.realPath)
         assert f" is above {named}, " in note and note.endswith(f"; {remedy}")
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="mesh"), "unapplied")))
+    stage.GetPrimAtPath("/Hero/Skin").RemoveAPI(UsdSkel.BindingAPI)
+    stage.Save()
+    (note,) = (note for note in read_shot(tmp_path / "unapplied.usda").notes if "SkelBindingAPI" in note)
+    assert note.startswith("/Hero/Rig: SkelBindingAPI is not applied to /Hero/Skin, so USD draws it as modelled")
     # A reference on a prim with its own type, which is stronger than the SkelRoot's.
     stage = Usd.Stage.CreateNew(str(tmp_path / "set.usda"))
     for name, kind in (("Left", UsdGeom.Xform), ("Right", UsdSkel.Root)):
