@@ -75,7 +75,9 @@ def _told(hair, places: np.ndarray, ways: list[np.ndarray], metres: float) -> st
     far = metres * following.strays(path, [way[shown] for way in ways])
     if not far >= FAR:
         return ""
+    bone = hair.parent_bone if hair.parent_type == "BONE" else ""
+    remedy = f"if {bone} is the head, choose it as Head Bone; otherwise " if bone else ""
     return (
         f"{hair.name_full}: its object moves up to {1000 * far:.0f} mm relative to the head, which live hair and bakes do "
-        "not follow: they stay on the head bone; make it a child of the bone that it should follow"
+        f"not follow: they stay on the head bone; {remedy}make it a child of the bone that it should follow"
     )

@@ -55,7 +55,11 @@ def check_placed(places: np.ndarray, frames: np.ndarray, name: str) -> None:
     linear = places[:, :3, :3]
     for fact, wrong, remedy in (
         ("has zero scale", flat(linear, NONE), "give it and its parents a scale above zero"),
-        ("is mirrored (negative scale)", volumes(linear) < 0, "apply its scale (Ctrl A in Object Mode)"),
+        (
+            "is mirrored (negative scale)",
+            volumes(linear) < 0,
+            "apply its scale (Ctrl A in Object Mode), or its parent's if that is negative",
+        ),
     ):
         if wrong.any():
             raise NeuralocksError(

@@ -255,7 +255,8 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
     far = np.linalg.norm(character.canonical(body.points), axis=1)
     each = turn[body.joint_indices] * far[:, None] + shift[body.joint_indices]
     still = np.sum(body.joint_weights * each, axis=1) < STILL * character.times_human
-    head = character.skeleton.below(character.carrying_joint)
+    on_head = character.carrying_joint == character.head
+    head = character.of_head if on_head else character.skeleton.below(character.carrying_joint)
     still &= np.sum(body.joint_weights * head[body.joint_indices], axis=1) > HEAD
     for offsets, varies in zip(body.shapes.values(), np.ptp(clip.shape, axis=0) > 1e-6):
         if varies:

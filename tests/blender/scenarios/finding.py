@@ -4,7 +4,9 @@
 from pathlib import Path
 
 import bpy
+import numpy as np
 
+from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import choose
 
@@ -42,3 +44,43 @@ def _found(selected) -> tuple:
     choose(selected)
     assert bpy.ops.neuralocks.find() == {"FINISHED"}
     return settings.armature, settings.hair
+
+
+def head_of_a_control_rig(_folder: Path) -> None:
+    """As Rigify makes it: `head` is a control that moves no skin, and the bone that moves it copies it, below other bones. Both
+    ways of naming it give the same character, and hair as on a plain rig.
+    """
+    plain, hair = _sampled("head")
+    for chosen in ("", "DEF-spine.006", "head"):
+        sampled, points = _sampled("DEF-spine.006", chosen)
+        assert sampled.rig.bones[sampled.character.head] == (chosen or "DEF-spine.006")
+        found = {name: sampled.rig.bones[joint] for name, joint in sampled.character.humanoid.items() if name != "head"}
+        assert (found["neck"], found["upper_chest"], found["hips"]) == ("neck", "chest", "hips")
+        assert sampled.character.head_width == plain.character.head_width > 0.1
+        assert np.allclose(points, hair, atol=2e-5), chosen
+
+
+def _sampled(skin_bone: str, chosen: str = ""):
+    """A sampled character whose head's skin moves with this bone, with a chosen head bone, and its live hair in a frame."""
+    scenes.empty()
+    scene = bpy.context.scene
+    rig = scenes.armature(
+        bones=scenes.BONES
+        + (("root", "", (0, 0, 0), (0, 0, 0.1)), ("DEF-spine.006", "root", (0, 0, 1.55), (0, 0, 1.75)))
+    )
+    rig.pose.bones["DEF-spine.006"].constraints.new("COPY_TRANSFORMS").target = rig
+    rig.pose.bones["DEF-spine.006"].constraints[0].subtarget = "head"
+    skin = scenes.body(rig)
+    for bone in ("root", "DEF-spine.006"):
+        skin.vertex_groups.remove(skin.vertex_groups[bone])
+    skin.vertex_groups["head"].name = skin_bone
+    rig.data.bones["head"].use_deform = skin_bone == "head"
+    scenes.dance(rig)
+    hair = scenes.hair(rig)
+    rig.neuralocks_character.head_bone = chosen
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, hair
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    hair.neuralocks_hair.live = True
+    scene.frame_set(12)
+    assert not session.messages, session.messages
+    return session.rigs[rig.name_full], scenes.points(hair)
