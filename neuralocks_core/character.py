@@ -211,10 +211,14 @@ class Character:
         return None if self.body is None else self.body.posed(np.asarray(joints, float) @ self.inverse_bind, shape)
 
     @cached_property
+    def heads(self) -> list[int]:
+        """The head's joint, and copies of it in a control rig, from which its face and hair may hang."""
+        return [self.head, *copies(self.head, self.skeleton.parents, self.skeleton.bind[:, :3, 3])]
+
+    @cached_property
     def of_head(self) -> np.ndarray:
-        """Which joints (J,) bool are the head or below it, or below a copy of it: a control rig's face hangs from one."""
-        every = [self.head, *copies(self.head, self.skeleton.parents, self.skeleton.bind[:, :3, 3])]
-        return np.any([self.skeleton.below(joint) for joint in every], axis=0)
+        """Which joints (J,) bool are one of the `heads` or below one."""
+        return np.any([self.skeleton.below(joint) for joint in self.heads], axis=0)
 
     @cached_property
     def on_head(self) -> np.ndarray | None:

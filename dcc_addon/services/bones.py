@@ -74,9 +74,8 @@ class LiveBones:
     @classmethod
     def of(cls, model: RigModel, rig: RigArrays, character: Character) -> "LiveBones":
         """Bind a model; the error says why it does not fit this rig."""
-        below = character.skeleton.below(character.head)
         try:
-            model = replace(model, chains=model.chains.named_as(rig.paths, below))
+            model = replace(model, chains=model.chains.named_as(rig.paths, character.of_head))
             chains = placed_chains(model.chains, character)
             model.chains.check_same(chains)
         except NeuralocksError as error:

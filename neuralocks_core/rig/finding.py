@@ -5,7 +5,6 @@ import fnmatch
 
 import numpy as np
 
-from neuralocks_core.anatomy.humanoid import copies
 from neuralocks_core.anatomy.joint_names import carrier, leaf
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
@@ -55,12 +54,12 @@ def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHair
     names that do not say hair.
     """
     skeleton, head = character.skeleton, character.head
-    names, below = skeleton.names, skeleton.below(head)
+    names, below = skeleton.names, character.of_head
     others = ", ".join(leaf(names[j]) for j in skeleton.children[head][:8]) or "nothing"
     remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
     # Outside the head, `tail` means a tail.
     elsewhere = [j for j in np.flatnonzero(~below) if says_hair_alone(names[j])]
-    bare = [j for j in np.flatnonzero(below) if j != head and says_hair(names[j])]
+    bare = [j for j in np.flatnonzero(below) if j not in character.heads and says_hair(names[j])]
     unnamed = left_out(character, meshes or [])
     if elsewhere and skeleton.parents[elsewhere[0]] >= 0:
         first, above = leaf(names[elsewhere[0]]), leaf(names[skeleton.parents[elsewhere[0]]])
@@ -94,7 +93,7 @@ def left_out(
     def in_a_row(joint: int) -> int:
         return int(drives[joint]) + max(map(in_a_row, skeleton.children[joint]), default=0)
 
-    todo = list(skeleton.children[character.head])
+    todo = _children(character)
     while todo:
         joint = todo.pop(0)
         if not face[joint] and drives[joint] and not ((face | moved) & skeleton.below(joint)).any():
@@ -106,7 +105,7 @@ def left_out(
 
 def of_the_body(character: Character, meshes: list[SkinnedMesh] | None) -> np.ndarray:
     """Which joints (J,) bool drive a mesh that a joint outside the head drives, too."""
-    body, outside = np.zeros(len(character.skeleton.names), bool), ~character.skeleton.below(character.head)
+    body, outside = np.zeros(len(character.skeleton.names), bool), ~character.of_head
     for mesh in meshes or ():
         drives = mesh.driven_by(len(body))
         if (drives & outside).any():
@@ -127,8 +126,7 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
         raise NoHairChains(
             f"--chains {' '.join(patterns)}: no joint has such a name; see neuralocks inspect for their names"
         )
-    below = character.skeleton.below(character.head)
-    inside = [joint for joint in hits if below[joint] and joint != character.head]
+    inside = [joint for joint in hits if character.of_head[joint] and joint not in character.heads]
     if not inside and hits == [character.head]:
         raise NeuralocksError(
             f"--chains {' '.join(patterns)}: joint '{leaf(names[character.head])}' is the head; name the first joints of the hair, "
@@ -141,7 +139,7 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
             f"hang below '{leaf(names[character.head])}'"
         )
     if not inside:
-        above, head = _above(character, hits), leaf(names[character.head])
+        above, head = carrier(names[character.head], *(names[joint] for joint in hits)), leaf(names[character.head])
         raise NeuralocksError(
             f"skeleton: joint '{leaf(names[hits[0]])}' does not hang below the head joint '{head}', but from '{above}': name that "
             f"with --head {above}, as in training, or name other joints"
@@ -153,21 +151,18 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
     return [joint for joint in hits if not inner[joint]]
 
 
-def _above(character: Character, joints: list[int]) -> str:
-    """The joint to call the head so that all of these hang below it: a copy of the head if there is one, or what carries both."""
-    skeleton, head = character.skeleton, character.head
-    for copy in copies(head, skeleton.parents, skeleton.bind[:, :3, 3]):
-        if skeleton.below(copy)[joints].all():
-            return leaf(skeleton.names[copy])
-    return carrier(skeleton.names[head], *(skeleton.names[joint] for joint in joints))
+def _children(character: Character) -> list[int]:
+    """The joints that hang from the head, or from copies of it, which are none of its children."""
+    every = (child for head in character.heads for child in character.skeleton.children[head])
+    return [child for child in every if child not in character.heads]
 
 
 def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[int]:
     """First joints of the subtrees that are hair by their names or by what they drive."""
-    skeleton, head = character.skeleton, character.head
+    skeleton = character.skeleton
     names, children = skeleton.names, skeleton.children
     used, body = driving(skeleton, meshes), of_the_body(character, meshes)
-    tops, todo = [], [(joint, False) for joint in children[head]]
+    tops, todo = [], [(joint, False) for joint in _children(character)]
     while todo:
         joint, worn = todo.pop()
         tree = np.flatnonzero(skeleton.below(joint))

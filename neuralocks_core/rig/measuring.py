@@ -58,7 +58,7 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     if double:
         raise NeuralocksError(f"skeleton: two hair joints are named '{double}'; give each its own name")
     # A model tells joints with the same name apart by their parents, except for the first of a chain.
-    below = [leaf(skeleton.names[j]) for j in np.flatnonzero(skeleton.below(character.head))]
+    below = [leaf(skeleton.names[j]) for j in np.flatnonzero(character.of_head)]
     double = next((name for name, j in zip(names, joints) if j in tops and below.count(name) > 1), None)
     if double:
         raise NeuralocksError(
@@ -94,7 +94,7 @@ def placed_chains(chains: HairChains, character: Character) -> HairChains:
         NeuralocksError: a joint is missing, mirrored or unevenly scaled.
     """
     skeleton = character.skeleton
-    joints = chains.match(skeleton.names, skeleton.below(character.head))
+    joints = chains.match(skeleton.names, character.of_head)
     rows = {int(joint): row for row, joint in enumerate(joints)}
     parents = [rows.get(int(skeleton.parents[joint]), -1) for joint in joints]
     origins, axes = _origins_and_axes(character, joints)

@@ -59,7 +59,7 @@ def assemble_rig(
     moving = moving_joints(skeleton, chains)
     body_triangles, points, weights, triangles = [], [], [], []
     start, taken = 0, 0
-    for mesh, (body, moved) in zip(meshes, _parted(meshes, skeleton, character.head, moving)):
+    for mesh, (body, moved) in zip(meshes, _parted(meshes, character.of_head, moving)):
         body_triangles.append(body + start)
         start += len(mesh.points)
         if not moved.any():
@@ -90,16 +90,15 @@ def moving_joints(skeleton: Skeleton, chains: HairChains) -> np.ndarray:
     return np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
 
 
-def _parted(meshes: list[SkinnedMesh], skeleton: Skeleton, head: int, moving: np.ndarray):
+def _parted(meshes: list[SkinnedMesh], below: np.ndarray, moving: np.ndarray):
     """Which triangles are body and which vertices are hair.
 
-    A mesh that moving joints drive, and nothing outside the head's subtree, is hair as a whole, including the cap that is
+    A mesh that moving joints (J,) drive, and nothing that is not `below` (J,) the head, is hair as a whole, including the cap that is
     tied to the head; in a mesh that is both, triangles that a moving joint touches are hair.
 
     Returns:
         for each mesh (triangles of the body (F', 3), mask of hair vertices that move (V,)).
     """
-    below = skeleton.below(head)
     result = []
     for mesh in meshes:
         moved = mesh.weight_on(moving) > LEAST_WEIGHT

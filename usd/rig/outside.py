@@ -20,7 +20,7 @@ def outside_notes(source: StageRig) -> list[str]:
     drives = np.zeros(len(names), bool)
     for mesh in source.meshes:
         drives[mesh.indices[mesh.weights > LEAST_WEIGHT]] = True
-    beside = np.flatnonzero(drives & ~character.skeleton.below(character.head))
+    beside = np.flatnonzero(drives & ~character.of_head)
     loose = [
         names[j] for j in beside if says_hair_alone(names[j]) and "head" not in names[j].rpartition("/")[0].lower()
     ]

@@ -181,7 +181,7 @@ def _is_hairy(prim: Usd.Prim, model: HairChains | None) -> bool:
 
 def _of_model(model: HairChains, character: Character) -> HairChains:
     """A model's chains in a character, by the names that they have there."""
-    names, below = character.skeleton.names, character.skeleton.below(character.head)
+    names, below = character.skeleton.names, character.of_head
     chains = model.named_as(names, below)
     if not {leaf(name) for name in names} & set(chains.names):
         raise NoHairChains(

@@ -157,6 +157,20 @@ def test_a_joint_that_drives_the_cap_of_the_hair_is_no_bone():
     assert find_chains(who, [head, tails, _ring(who, "Hair", 0.2)]).names == ("Hair", "Hair_1", "Hair_2")
 
 
+@pytest.mark.parametrize("patterns", [None, ["hair_1"]])
+def test_hair_may_hang_from_a_copy_of_the_head(patterns):
+    """As on the rigs that Rigify makes, where a bone below other bones copies the control that is the head."""
+    at = character().skeleton
+    head = tuple(at.bind[[name.endswith("/head") for name in at.names].index(True), :3, 3])
+    who = character([("copy", "hips", head), *tail("hair", 3, parent="copy")])
+    points = np.eye(3) * 0.1 + [0, 1.6, -0.1]
+    chains = find_chains(who, [skin(who, {"hair_1": points, "hair_2": points})], patterns)
+    assert chains.names == ("hair_1", "hair_2") and list(chains.parents) == [-1, 0]
+    elsewhere = character([("copy", "hips", np.add(head, 0.1)), *tail("hair", 3, parent="copy")])
+    with pytest.raises(NeuralocksError, match="--head copy"):
+        find_chains(elsewhere, [skin(elsewhere, {"hair_1": points, "hair_2": points})])
+
+
 def test_a_cap_may_leave_the_forehead_free_and_ears_stand_out():
     """Both are narrower than the head's box; a bun as large as that, behind the head, is a hair bone."""
     who = character([("Hair", "head", (0, 1.6, 0)), *tail("Hair", 3, parent="Hair")])
