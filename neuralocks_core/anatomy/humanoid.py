@@ -7,6 +7,7 @@ has one, by hierarchy, `limb_chains`), and the trunk by hierarchy: the upper che
 arms meet.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -181,7 +182,8 @@ def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions, 
 def _find_head(names, sides, keys, parents, positions):
     def score(i):
         key = keys[i]
-        return (key != "head", not key.endswith("head"), depth(i, parents), i)
+        # XNALara's `head neck lower` is a neck, its `head neck upper` the head.
+        return (key != "head", not key.endswith("head"), "lower" in key, depth(i, parents), i)
 
     def beside_head(i):
         """Hair chains hang from necks too: the head is in the middle, and farthest along the neck."""
@@ -203,10 +205,11 @@ def _find_head(names, sides, keys, parents, positions):
         children = [i for i in range(len(keys)) if parents[i] == neck]
         if children:
             return min(children, key=beside_head), f"child of the neck '{leaf(names[neck])}'"
-    # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the head.
+    # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the head; an animal's begin
+    # with its tail.
     spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]
     if len(spine) >= 5:
-        best = max(spine, key=lambda i: depth(i, parents))
+        best = max(spine, key=lambda i: (int("0" + re.search(r"\d{0,9}$", names[i])[0]), depth(i, parents)))
         return best, f"last joint of the spine '{leaf(names[best])}'"
     return None, ""
 

@@ -35,6 +35,15 @@ _NOISE = {
     "stretch",
     "armature",
     "x",
+    "bnd",
+    "bind",
+    "skn",
+    "env",
+    "rig",
+    "drv",
+    "deform",
+    "jt",
+    "bj",
 }
 _JAPANESE = {
     "左": "Left",

@@ -8,9 +8,9 @@ PARTS = {
     "upper_arm": ("upperarm", "uparm", "arm", "shldr", "humerus", "armupper", "armup", "uarm"),
     "lower_arm": ("lowerarm", "forearm", "lowarm", "elbow", "armlower", "loarm", "armlow", "farm"),
     "hand": ("hand", "wrist"),
-    "upper_leg": ("upperleg", "upleg", "thigh", "legupper", "legup", "hip", "femur"),
-    "lower_leg": ("lowerleg", "calf", "shin", "knee", "leglower", "loleg", "leglow", "leg"),
-    "foot": ("foot", "ankle"),
+    "upper_leg": ("upperleg", "upleg", "thigh", "legupper", "legup", "legthigh", "hip", "femur"),
+    "lower_leg": ("lowerleg", "calf", "shin", "knee", "leglower", "loleg", "leglow", "legknee", "leg"),
+    "foot": ("foot", "ankle", "legankle"),
     "eye": ("eye", "eyeball"),
 }
 _COLLARS = tuple(word for word in PARTS["shoulder"] if word != "shoulder")

@@ -13,6 +13,8 @@ UPRIGHT = 0.7
 """Legs run along the trunk if this share of them does. An animal's do not, and it has no arms."""
 LEVEL = 0.5
 """A leg's last bone is a foot, and points where the character looks, if at least this share of it is level."""
+ASIDE = 0.1
+"""A finger begins at least this share of the middle one's first bone aside of it; twist joints lie on their bone."""
 COLLAR = 0.13
 """An arm's first joint is the collar bone's if it is nearer to the middle than this share of the arm's reach."""
 
@@ -130,7 +132,7 @@ def _first_side(pair: _Pair, legs: _Pair | None, at: np.ndarray, up: np.ndarray,
 def _named(chain: list[int], parents, at: np.ndarray, reach: np.ndarray, parts) -> dict[str, int]:
     """Joints by part: the limb's two long bones are the pair whose shorter bone is longest; a joint with fingers is its end."""
     collar, upper, lower, end = parts
-    fingers = next((i for i in range(2, len(chain)) if np.sum(parents == chain[i]) >= 3), len(chain) - 1)
+    fingers = next((i for i in range(2, len(chain) - 1) if _spreads(*chain[i : i + 2], parents, at)), len(chain) - 1)
     bones = np.linalg.norm(np.diff(at[chain[: fingers + 1]], axis=0), axis=1)
     trunk = at[chain[0]] - at[parents[chain[0]]]
     first = int(bool(collar) and fingers >= 3 and abs(trunk @ reach) < COLLAR * (reach @ reach))
@@ -139,3 +141,10 @@ def _named(chain: list[int], parents, at: np.ndarray, reach: np.ndarray, parts) 
     if collar and start:
         joints[collar] = chain[start - 1]
     return joints
+
+
+def _spreads(joint: int, following: int, parents, at: np.ndarray) -> bool:
+    """Whether a joint has at least two children beside the way to the following one, as a hand has fingers."""
+    way, others = at[following] - at[joint], at[parents == joint] - at[joint]
+    length = np.linalg.norm(way)
+    return length > 0 and int((np.linalg.norm(np.cross(others, way), axis=1) > ASIDE * length**2).sum()) >= 2

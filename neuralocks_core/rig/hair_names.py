@@ -18,7 +18,7 @@ _FACE = (
     "|pupil|iris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
     "|whisker|mo?ustache|bunny|neko"
     "|fang|choker|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
-    "|antenna|feather|flower|wreath|pendant|necklace|locket|piercing|jewel|ornament|accessor"
+    "|antenna|antler|feather|flower|wreath|pendant|necklace|locket|piercing|jewel|ornament|accessor"
     "|(?:bow|pin|clip|cap|hood|veil|mask|halo|bell|gem|wing|mic)s?$"
 )
 _HAIR_ANYWHERE = re.compile(
@@ -29,22 +29,24 @@ _HAIR_ANYWHERE = re.compile(
 """They count anywhere in a name, except 发, which also begins other words and counts only at a word's end; names in
 MikuMikuDance rigs come in files with UTF-8 names."""
 _FACE_ANYWHERE = re.compile(
-    "headphone|headset|headband|headdress|headgear|headwear"
+    "(?:cat|dog|fox|wolf|elf|left|right)ears?[lr]?$|mimi(?!c)|headphone|headset|headband|headdress|headgear|headwear"
     "|目|眼|瞳|眉|まつ毛|まつげ|睫|口|歯|牙|舌|あご|顎|耳|鼻|頬|ほほ|ひげ|髭|角"
-    "|メガネ|めがね|帽|カチューシャ|ヘッド|ピアス|イヤリング|ティアラ|マスク|ゴーグル|かんざし|簪|冠|鈴|ネコミミ"
+    "|メガネ|めがね|帽|カチューシャ|ヘッド|ピアス|イヤリング|ティアラ|マスク|ゴーグル|かんざし|簪|冠|鈴|ミミ|みみ"
     "|下巴|蝴蝶结|눈|턱|혀|귀|안경|모자"
 )
 _WORN_IN_HAIR = re.compile(
-    r"hair(?:pin|clip|band|tie|bow|accessor|ornament|decor|net|flower)|ribbon"
-    r"|リボン|리본|飾|饰|ヘア(?:ピン|バンド|ゴム)|髪(?:かざり|留|止)|发(?:带|夹|卡|箍|簪|圈|绳)"
+    r"hair(?:pin|clip|band|tie|bow|acc|ornament|decor|net|flower|feather|rope|ring(?!let))|ribbon"
+    r"|リボン|리본|飾|饰|ヘア(?:ピン|バンド|ゴム)|髪(?:かざり|留|止|ゴム)|发(?:带|夹|卡|箍|簪|圈|绳)"
 )
 """Ribbons and pins are stiff or have their own animation: they ride on the hair or the head."""
+_SCALP = "facial"
+"""First word of MetaHuman's face joints, of which `FACIAL_L_HairA1` moves a patch of scalp."""
 
 
 def says_hair(name: str) -> bool:
     """Whether a joint's path or name means hair: `Hair_L.001`, `frontHair2` and `PigTail_L` do, `earring` and `hairpin` do not."""
     whole = _whole(name)
-    if _WORN_IN_HAIR.search(whole):
+    if _no_hair(name):
         return False
     if _begins(name, _HAIR) or _HAIR_ANYWHERE.search(whole):
         return True
@@ -57,13 +59,18 @@ def says_hair(name: str) -> bool:
 def says_hair_alone(name: str) -> bool:
     """Whether a joint's path or name means hair anywhere in a skeleton: below a chest, a fringe or a tail is a garment's."""
     whole = _whole(name)
-    return not _WORN_IN_HAIR.search(whole) and bool(_begins(name, _HAIR_ALONE) or _HAIR_ANYWHERE.search(whole))
+    return not _no_hair(name) and bool(_begins(name, _HAIR_ALONE) or _HAIR_ANYWHERE.search(whole))
 
 
 def says_face(name: str) -> bool:
     """Whether a joint's path or name means a part of the face, or what a head wears."""
     whole = _whole(name)
     return bool(_begins(name, _FACE) or _FACE_ANYWHERE.search(whole) or _WORN_IN_HAIR.search(whole))
+
+
+def _no_hair(name: str) -> bool:
+    """Whether a name that has a word for hair means what is worn in it, or skin."""
+    return bool(_WORN_IN_HAIR.search(_whole(name))) or words(_own(name))[:1] == [_SCALP]
 
 
 def _begins(name: str, beginnings: str) -> bool:

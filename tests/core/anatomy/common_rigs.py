@@ -120,6 +120,32 @@ RIGS = {
         "      DEF-spine.006\n    DEF-shoulder.L\n     DEF-upper_arm.L\n    DEF-shoulder.R\n     DEF-upper_arm.R",
         {"head": "DEF-spine.006", "neck": "DEF-spine.004", "upper_chest": "DEF-spine.003"},
     ),
+    "Rigify, a wolf's deforming bones": (
+        "DEF_spine\n DEF_spine_001\n  DEF_spine_002\n   DEF_spine_003\nDEF_spine_004\n DEF_spine_005\n  DEF_spine_006\n"
+        "   DEF_spine_010\n    DEF_spine_011",
+        {"head": "DEF_spine_011"},
+    ),
+    "Maya, marked as binding": (
+        "root_bind\n spine_bind\n  neck_bind\n   head_bind\n  L_clavicle_bind_JNT\n   L_bnd_upperArm\n    L_lowerArm_bnd\n"
+        "  R_clavicle_skn\n   R_upperArm_env\n    R_lowerArm_drv",
+        {
+            "left_shoulder": "L_clavicle_bind_JNT",
+            "left_upper_arm": "L_bnd_upperArm",
+            "right_upper_arm": "R_upperArm_env",
+            "right_lower_arm": "R_lowerArm_drv",
+        },
+    ),
+    "XNALara": (
+        "root_ground\n root_hips\n  spine_lower\n   spine_upper\n    head_neck_lower\n     head_neck_upper\n    arm_left_shoulder_1\n"
+        "     arm_left_shoulder_2\n      arm_left_elbow\n  leg_left_thigh\n   leg_left_knee\n    leg_left_ankle",
+        {
+            "head": "head_neck_upper",
+            "neck": "head_neck_lower",
+            "left_upper_leg": "leg_left_thigh",
+            "left_lower_leg": "leg_left_knee",
+            "left_foot": "leg_left_ankle",
+        },
+    ),
     "AdvancedSkeleton": (
         "Root_M\n Spine1_M\n  Chest_M\n   Neck_M\n    Head_M\n   Scapula_L\n    Shoulder_L\n     Elbow_L\n   Scapula_R\n"
         "    Shoulder_R",

@@ -102,6 +102,19 @@ def test_an_animal_on_four_legs_has_no_arms():
     assert limbs({name: (JOINTS[name][0], place) for name, place in bent.items()} | legs) == {}
 
 
+def test_twist_joints_make_no_hand_of_an_elbow():
+    """Two of them and the hand are three children, like fingers; they lie on the forearm."""
+    twists = {
+        f"{side}_twist{n}": (
+            f"{side}_elbow",
+            tuple(np.array([sign * 0.42, 1.3, 0]) + 0.3 * n * np.array([sign * 0.2, -0.15, 0.03])),
+        )
+        for side, sign in (("l", 1), ("r", -1))
+        for n in (1, 2)
+    }
+    assert limbs(JOINTS | TOES | twists) == MEANT
+
+
 def test_a_trunk_alone_and_broken_places_have_no_limbs():
     trunk = {name: JOINTS[name] for name in ("root", "pelvis", "waist", "breast", "throat", "top")}
     assert limbs(trunk) == {}

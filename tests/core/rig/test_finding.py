@@ -47,7 +47,9 @@ def test_what_names_of_many_conventions_say():
     hair = "J_Sec_Hair1_01 J_L_HairFront_00_SJ hair_01_l Bip001_HairA01 bangs_C_1 PonyTail_L SideLock_R maegami_01 tail_L_01 wig_01 "
     hair += "HairBun_L 前髪_01 左もみあげ 三つ編み1 横毛2 头发01"
     other = "leftEye eye_L brow_tail ear_tuft EarRing_L_02 CatEar_R nekomimi HairRibbon_L hair_clip_L HeadBand Sunglasses horn_L "
-    other += "mustache_L bangle_1 BunnyEar_L wiggle_2 両目 まつ毛 舌1 髪飾り左 髪リボン1 メガネ 猫耳_L"
+    other += "mustache_L bangle_1 BunnyEar_L wiggle_2 両目 まつ毛 舌1 髪飾り左 髪リボン1 メガネ 猫耳_L "
+    other += "Mimi_L Kemonomimi_R ケモミミ_L うさみみ catear_L leftear Antler.L HairRope_L HairRing_L HairAcc_L HairFeather 髪ゴム "
+    other += "FACIAL_C_Hair1 FACIAL_L_12IPV_Hair1 FACIAL_R_HairA3 FACIAL_L_Sideburn2"  # MetaHuman's scalp and temples
     assert [name for name in hair.split() if not says_hair(name)] == []
     assert [name for name in other.split() if says_hair(name)] == []
     assert [name for name in other.split() if not says_face(name)] == ["bangle_1", "wiggle_2"]
