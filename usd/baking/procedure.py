@@ -44,7 +44,8 @@ def read_asked(
     if not isinstance(shot, Shot):
         shot = read_shot(shot, grooms, skeleton, head, joints, cuts, still=wind is not None)
     check_frames_named(shot.path, frames, shot.first, shot.last, shot.rigs)
-    return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame)
+    samples = [code for rig in shot.rigs for code in rig.source.samples]
+    return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame, samples)
 
 
 def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[str]:

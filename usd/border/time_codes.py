@@ -37,7 +37,7 @@ def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
     return first, last, step
 
 
-def time_codes(frames, first: float, last: float, subframes: int = 1, frame: float = 1.0) -> list[float]:
+def time_codes(frames, first: float, last: float, subframes: int = 1, frame: float = 1.0, samples=()) -> list[float]:
     """Ascending time codes without duplicates.
 
     Args:
@@ -45,13 +45,14 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
         first, last: the shot's range.
         subframes: samples per frame: n adds the n - 1 times at equal steps after each frame, for motion blur.
         frame: time codes from one frame to the next.
+        samples: those of the animation, which tell where frames are if the range begins between whole numbers.
 
     Raises:
         NeuralocksError: no frame, too many, or something that is not a time code.
     """
     check_number("--subframes", subframes, 1, MOST_SUBFRAMES, whole=True)
     if frames is None or isinstance(frames, str):
-        begin, end, step = _whole_range(first, last, frame) if frames is None else parse_frames(frames, frame)
+        begin, end, step = _whole_range(first, last, frame, samples) if frames is None else parse_frames(frames, frame)
         begin, end = on_frame(begin, first, frame), on_frame(end, first, frame)
         count = (end - begin) / step + 1e-6  # may overflow to infinity
         if not count * subframes < MOST:
@@ -93,12 +94,18 @@ def given_cuts(cuts, loop: bool = False) -> list[float] | None:
     return [] if loop else given
 
 
-def _whole_range(first: float, last: float, frame: float) -> tuple[float, float, float]:
-    """First and last time code of a shot's frames, and from one to the next: players show the first and count from there, also if it
-    is no whole number.
-    """
-    begin = float(round(first)) if frame == 1 and abs(first - round(first)) < NEAR else first
+def _whole_range(first: float, last: float, frame: float, samples) -> tuple[float, float, float]:
+    """First and last time code of a shot's frames, and from one to the next."""
+    # If a time code is a frame, frames are whole numbers, unless the animation has all its samples between them, as the range begins;
+    # otherwise the shot begins with a frame.
+    between = _off(first) > NEAR and len(samples) > 0 and all(_off(code - first) < NEAR for code in samples)
+    begin = float(math.ceil(first - 1e-9)) if frame == 1 and not between else first
     return begin, max(last, begin), frame
+
+
+def _off(code: float) -> float:
+    """How far a number is from a whole one."""
+    return abs(code - round(code))
 
 
 def _numbers(codes, name: str) -> list[float]:

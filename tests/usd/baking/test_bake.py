@@ -59,6 +59,25 @@ def test_the_layer_holds_samples_and_nothing_else(baked):
     assert np.array_equal(curves.GetPointsAttr().Get(), rest)
 
 
+def test_a_shot_whose_frames_lie_between_whole_numbers_is_baked_at_its_own(baked, model, tmp_path):
+    """Otherwise it would have no sample at its first and last frame, where the hair would leave the head."""
+    shot, result = baked
+    stage = Usd.Stage.CreateNew(str(tmp_path / "later.usda"))
+    stage.GetRootLayer().subLayerPaths.append(str(shot))
+    stage.GetRootLayer().subLayerOffsets[0] = Sdf.LayerOffset(0.5)
+    for key in ("metersPerUnit", "upAxis", "timeCodesPerSecond"):
+        stage.SetMetadata(key, open_stage(shot).GetMetadata(key))
+    stage.SetStartTimeCode(1.5)
+    stage.SetEndTimeCode(9.5)
+    stage.Save()
+    later = bake(tmp_path / "later.usda", tmp_path / "hair.usda", model)
+    assert later.frames == [frame + 0.5 for frame in result.frames]
+    stages = [Usd.Stage.Open(str(path)) for path in (result.path, later.path)]
+    plain, hair = (UsdGeom.BasisCurves.Get(each, "/Hero/Hair").GetPointsAttr() for each in stages)
+    for frame in (1.0, 9.0):
+        assert np.allclose(plain.Get(frame), hair.Get(frame + 0.5), atol=1e-5)
+
+
 def test_validators_find_nothing(baked, tmp_path, model):
     mesh = bake(write_shot(tmp_path, Recipe(bound="mesh", unit=0.01, up="Z")), tmp_path / "mesh.usda", model)
     context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
