@@ -31,6 +31,8 @@ VERTICES = 4000
 """Most vertices of the hair that are measured, evenly over its meshes."""
 FRAMES, DEEPEST_FRAMES = 48, 8
 """Frames in which distances to the body are measured: the former evenly over the animation, the latter where hair seems deepest."""
+LOOKED_AT = 1000
+"""Most frames, evenly over the animation, among which the deepest are sought."""
 ROUNDING = 0.01
 """Less than this [mm] counts as no swing and no depth."""
 
@@ -189,13 +191,14 @@ def _moved(
     still = metrics.held(clip.joints[:, ~moving], clip.times)
     quiet = clip.times - np.maximum.accumulate(np.where(still, -np.inf, clip.times)) >= metrics.QUIET_AFTER
     wanted = set(np.linspace(0, len(clip.times) - 1, min(len(clip.times), FRAMES)).round().astype(int).tolist())
+    every = -(-len(clip.times) // LOOKED_AT)
     for row, both in enumerate(posed.each(say)):
         total = total + np.square(both[0] - both[1]).sum(axis=-1)
         if row and quiet[row - 1] and quiet[row]:
             steps.append(metrics.jitter(np.stack([before, both[0]])))
         if row in wanted:
             seen[row] = both
-        elif posed.skin is not None:
+        elif posed.skin is not None and row % every == 0:
             deep = sorted([*deep, (posed.seemingly(row, both[0]), row, both)], key=itemgetter(0))[-DEEPEST_FRAMES:]
         before = both[0]
     return total / len(clip.times), max(steps, default=float("nan")), seen, {row: both for _, row, both in deep}
