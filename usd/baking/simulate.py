@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.deformation.lengths import keep_lengths
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.errors import NeuralocksError
@@ -116,7 +117,8 @@ class _SimulatedPoser:
         self._chosen = chosen
         self._others = np.setdiff1d(np.arange(len(mean)), chosen)
         self._nearest = cKDTree(mean[chosen]).query(mean[self._others])[1]
-        self._resolver = Resolver(character, begun.subset(self._others), clip)
+        followers = begun.subset(self._others)
+        self._resolver, self._rest = Resolver(character, followers, clip), followers.rest
 
     def points(self, time_code: float) -> np.ndarray:
         """(P, 3) float32, in the prim's own space and units."""
@@ -128,7 +130,9 @@ class _SimulatedPoser:
         return self._placer.points(time_code, joints, lambda strands: moved[strands])
 
     def _push(self, moved: np.ndarray, joints: np.ndarray, shape: np.ndarray) -> None:
-        """Push the following strands out of the body, in place: the solver kept only the strands that they follow out of it."""
-        followed = moved[self._others]
+        """Push the following strands out of the body, in place: the solver kept only the strands that they follow out of it. Their
+        lengths come first, since what moves another strand as it should stretches them, and restored afterwards they go in again.
+        """
+        followed = keep_lengths(self._rest, moved[self._others], smooth=False)
         self._resolver.apply(followed, joints, shape)
         moved[self._others] = followed
