@@ -228,12 +228,18 @@ class Character:
         return np.sum(self.body.joint_weights * self.of_head[self.body.joint_indices], axis=1) > 0.5
 
     @cached_property
+    def on_head_joint(self) -> np.ndarray | None:
+        """Which body vertices (V,) move mainly with the head's own joint."""
+        if self.body is None:
+            return None
+        return np.sum(self.body.joint_weights * (self.body.joint_indices == self.head), axis=1) > 0.5
+
+    @cached_property
     def skin(self) -> np.ndarray | None:
         """Which body vertices (V,) are the character's own, not what it wears; all if that is unknown."""
         if self.body is None:
             return None
-        on_joint = np.sum(self.body.joint_weights * (self.body.joint_indices == self.head), axis=1) > 0.5
-        return own_skin(self.body.points, self.body.triangles, self.on_head, on_joint, HEAD_WIDTHS[0])
+        return own_skin(self.body.points, self.body.triangles, self.on_head, self.on_head_joint, HEAD_WIDTHS[0])
 
     @cached_property
     def head_skin(self) -> np.ndarray | None:

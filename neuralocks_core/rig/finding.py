@@ -222,11 +222,9 @@ def _is_cap(character: Character, joint: int, meshes: list[SkinnedMesh]) -> bool
 
 def _skull(character: Character, meshes: list[SkinnedMesh]) -> np.ndarray:
     """Where the upper half of the head's own skin is, seen from above (n, 2) [m]: without hats, bows and hair on joints of its own."""
-    body, head = character.body, character.head
-    if body is None:
-        return _driven(character, head, meshes)
-    on_head = np.sum(body.joint_weights * (body.joint_indices == head), axis=1) > 0.5
-    points = character.canonical(body.points[on_head & character.skin])
+    if character.body is None:
+        return _driven(character, character.head, meshes)
+    points = character.canonical(character.body.points[character.on_head_joint & character.skin])
     return points[points[:, 1] > points[:, 1].max(initial=0.0) / 2][:, [0, 2]]
 
 
