@@ -50,6 +50,7 @@ def test_what_is_there_and_does_not_load_is_not_called_missing(tmp_path, monkeyp
         ({"hidden": 0}, "--hidden 0: must be a whole number from 1 to 256"),
         ({"clips": 1}, "--clips 1: must be a whole number from 2 to 10000"),
         ({"material": {"bend": float("nan")}}, "--bend nan: must be a number from 1e-06 to 10000"),
+        ({"seed": -1}, "--seed -1: must be a whole number"),
         ({"dynamic": False, "clips": 8}, "have no effect on held poses; leave out --quasi-static"),
         ({"dynamic": False, "material": {"damping": 2.0}}, "have no effect on held poses"),
     ],
