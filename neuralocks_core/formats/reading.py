@@ -89,7 +89,7 @@ def read_with_look(
         likely = _likely_unit(scalp if scalp > 0 else size / 2)  # one strand, or all from one point
         if scale is None:
             scale = likely
-            notes.append(f"{path}: does not state its unit; {_taken(scalp, likely)}; import --unit says otherwise")
+            notes.append(_unstated(path, "does not state its unit", scalp, likely))
         elif scale != likely and size > 0:  # ten times off, or more
             fact = f"its format counts in {_name(scale)}, which makes it {scale * size:.3g} m of hair"
             notes.append(f"{path}: {fact}; import --unit {_name(likely)}?")
@@ -119,13 +119,14 @@ def read_with_look(
     return groom, look, notes
 
 
-def common_unit(paths: Sequence[str | Path], sized: bool = False) -> float | None:
-    """The unit [m] that suits the roots of several files with parts of one head of hair; None if one of them has a unit of its own, or
-    if their roots tell nothing.
+def common_unit(paths: Sequence[str | Path], sized: bool = False) -> tuple[float | None, list[str]]:
+    """The unit [m] that suits the roots of several files with parts of one head of hair, and the note that it was assumed; None if one of
+    them has a unit of its own, or if their roots tell nothing.
 
     Args:
         paths: the files.
-        sized: the hair gets the size of a head anyway, so that a unit which all of them have, right or wrong, does not matter.
+        sized: the hair gets the size of a head anyway, so that a unit which all of them have, right or wrong, does not matter, and no
+            note is needed.
 
     Raises:
         NeuralocksError: as `read`.
@@ -136,9 +137,12 @@ def common_unit(paths: Sequence[str | Path], sized: bool = False) -> float | Non
         units.add(raw.unit)
         roots.append(_roots(raw, raw.points))
     if len(units) > 1 or units != {None} and not sized:
-        return None
+        return None, []
     scalp = _scalp(np.concatenate(roots))
-    return _likely_unit(scalp) if 0 < scalp < np.inf else None
+    if not 0 < scalp < np.inf:
+        return None, []
+    unit = _likely_unit(scalp)
+    return unit, [] if sized else [_unstated(", ".join(map(str, paths)), "do not state their unit", scalp, unit)]
 
 
 def _content(path: Path) -> bytes:
@@ -209,6 +213,10 @@ def _scalp(roots: np.ndarray) -> float:
 def _likely_unit(extent: float, units=(1.0, 0.01, 0.001)) -> float:
     """The unit [m] by which an extent is nearest to a narrow scalp's width, as a ratio."""
     return min(units, key=lambda unit: abs(np.log(max(extent, 1e-12) * unit / SCALP)))
+
+
+def _unstated(subject, fact: str, scalp: float, unit: float) -> str:
+    return f"{subject}: {fact}; {_taken(scalp, unit)}; import --unit says otherwise"
 
 
 def _taken(scalp: float, unit: float) -> str:

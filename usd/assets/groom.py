@@ -14,6 +14,7 @@ from neuralocks_core.strands.strand_set import root_uv
 from ..baking.header import write_header
 from ..border.arrays import floats, integers, row_matrix
 from ..border.stage_files import write_stage
+from ..shot.curves import find_curves
 from ..skel.stage_rig import StageRig
 from .beside import Beside
 from .prims import POLYLINES, Spline, author_curves
@@ -53,6 +54,17 @@ class Over:
     def stage(self) -> Usd.Stage:
         """The file's."""
         return self.rig.source.prim.GetStage()
+
+    def notes(self) -> list[str]:
+        """The note on hair that the file has already, which new hair does not replace."""
+        there = find_curves(self.stage)
+        if not there:
+            return []
+        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+        return [
+            f"{there[0].GetPath()}{more}: {self.path.name} has this hair already, and a bake moves it beside the new; deactivate "
+            "it if the new hair replaces it"
+        ]
 
     def finish(self, layer: Sdf.Layer, out: Path) -> None:
         """Make a layer, to be found at `out`, one over the file."""

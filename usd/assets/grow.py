@@ -68,13 +68,14 @@ def grow(
     rig = rigs[0]
     (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
     check_writable(out)
+    over = Over(rig, as_path(character, "character")) if with_character else None
     if tell:
-        tell([*first_of(rigs), *rig.notes, *unlikely_head(rig)])
+        tell([*first_of(rigs), *rig.notes, *unlikely_head(rig), *(over.notes() if over else [])])
     say = progress or silent
     say(0, 1000, "looking at the head")
     groom = Barber(rig.character).grow(style, count, seed, variation, within(say, _SEEN, _GROWN))
     say(_GROWN, 1000, f"writing {out.name}")
-    return write_groom(out, groom, rig, Over(rig, as_path(character, "character")) if with_character else None)
+    return write_groom(out, groom, rig, over)
 
 
 class Barber:

@@ -66,7 +66,7 @@ def import_groom(
         NeuralocksError: the source cannot be read, the target cannot be written, or the character has no head with skin.
     """
     sources = [as_path(each, "source") for each in (source if isinstance(source, list | tuple) else [source])]
-    out, rig, notes, found = as_path(out, "out"), None, [], []
+    out, rig, over, notes, found = as_path(out, "out"), None, None, [], []
     for option, value in (("with-character", with_character), ("skeleton", skeleton), ("head", head)):
         if value and character is None:
             raise NeuralocksError(f"--{option}: there is no character; name one with --character")
@@ -76,8 +76,10 @@ def import_groom(
         rigs = read_rigs(character, skeleton, head)
         rig = rigs[0]
         (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
-        notes += [*first_of(rigs), *rig.notes, *unlikely_head(rig)]
-    counted = unit if unit is not None else _common_unit(sources, rig is not None)
+        over = Over(rig, as_path(character, "character")) if with_character else None
+        notes += [*first_of(rigs), *rig.notes, *unlikely_head(rig), *(over.notes() if over else [])]
+    counted, told = (unit, []) if unit is not None else _common_unit(sources, rig is not None)
+    notes += told
     for number, path in enumerate(sources):
         say((_READ if rig else _LAID) * number // len(sources), 1000, f"reading {path.name}")
         read, told = _read(path, out, counted, up)
@@ -89,17 +91,16 @@ def import_groom(
             found, told, elsewhere = _put_on(rig, found, unit is None, within(say, _READ, _LAID))
         notes += [f"{subject}: {told}", *elsewhere]
     say(_LAID, 1000, f"writing {out.name}")
-    over = Over(rig, as_path(character, "character")) if rig and with_character else None
     write_grooms(out, found, rig, over)
     return [each.groom for each in found], notes
 
 
-def _common_unit(sources: list[Path], sized: bool) -> float | None:
-    """One unit for all parts of a head, if they leave it open; None to let each file's reader find it, and tell. Where a head sizes the
-    hair, it need not be told.
+def _common_unit(sources: list[Path], sized: bool) -> tuple[float | None, list[str]]:
+    """One unit for all parts of a head, if they leave it open, and the note on it; None to let each file's reader find it, and tell. Where
+    a head sizes the hair, it need not be told.
     """
     if len(sources) < 2 and not sized or any(path.suffix.lower() in (*USD, *OTHERS) for path in sources):
-        return None
+        return None, []
     from neuralocks_core import formats
 
     return formats.common_unit(sources, sized)
