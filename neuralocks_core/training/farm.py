@@ -75,15 +75,15 @@ class RolloutFarm:
         """Whether a process ended with an error."""
         return any(process.exitcode not in (None, 0) for process in self._processes)
 
-    def failure(self, then: str) -> NeuralocksError:
-        """Why it failed; `then` is what to do once the cause is fixed."""
+    def failure(self) -> NeuralocksError:
+        """Why it failed; what it has made so far is still there."""
         if self._told.poll():
             why = self._told.recv()
         elif any((process.exitcode or 0) < 0 for process in self._processes):
             why = "training: the solver's process was killed; free some memory"
         else:
             why = "training: the solver's process ended early; fix what it reports above"
-        return NeuralocksError(f"{why}, and {then}")
+        return NeuralocksError(f"{why}, and go on with --resume")
 
 
 @contextmanager

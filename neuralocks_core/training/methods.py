@@ -144,6 +144,6 @@ def wait(farm: RolloutFarm, count: int, say: Callable[[int, int], None], numbere
         if (there := len(farm.files(count if numbered else None))) >= count:
             return
         if farm.failed() or not alive:
-            raise farm.failure("try again")
+            raise farm.failure()
         say(there, count)
         time.sleep(0.2)

@@ -210,7 +210,7 @@ class _Run:
         for state in self.method.train(self.net, self._optimisers, step=meta["step"], done=min(spent, 1.0)):
             for each in (farm, held_farm):
                 if each.failed():
-                    raise each.failure("go on with --resume")
+                    raise each.failure()
             now = time.monotonic()
             first = gauge is None and len(held_farm.files()) >= HELD_OUT
             if now - last > SAVE_EVERY or state.done >= 1.0 or first:
