@@ -129,11 +129,11 @@ def simulate_command(
 
 
 def _how_to_go_on(out: Path) -> list[str]:
-    """How to resume: nobody would look for frames in a hidden folder."""
+    """How to resume: nobody would look for samples in a hidden folder."""
     from ..baking.spool import kept
 
-    frames = kept(out)
-    return [f"the same command continues from here, with {counted(frames, 'frame')} done"] if frames else []
+    samples = kept(out)
+    return [f"the same command continues from here, with {counted(samples, 'sample')} done"] if samples else []
 
 
 def _bake_report(result, as_json: bool) -> None:

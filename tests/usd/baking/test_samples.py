@@ -181,7 +181,7 @@ main()"""
     words = ["bake", str(shot), "-o", str(out), "--model", str(model)]
     done = subprocess.run([sys.executable, "-c", code, *words], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 130 and not out.exists() and kept(out) == 3
-    assert done.stderr.endswith("note: the same command continues from here, with 3 frames done\nstopped\n")
+    assert done.stderr.endswith("note: the same command continues from here, with 3 samples done\nstopped\n")
 
 
 @pytest.mark.parametrize("save_every", [1, 1 << 30])
@@ -196,7 +196,7 @@ def test_a_disk_that_fills_up_leaves_finished_frames_to_go_on_from(tmp_path, mod
     assert ended.value.code == 1 and not out.exists()
     *_, note, error = capsys.readouterr().err.splitlines()
     done = kept(out)
-    assert note == f"note: the same command continues from here, with {done} frames done" and done >= 3
+    assert note == f"note: the same command continues from here, with {done} samples done" and done >= 3
     assert error.startswith(f"error: {out}: ") and "space" in error
     assert bake(shot, out, model).resumed >= done - 1
     assert out.read_bytes() == whole
