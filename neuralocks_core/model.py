@@ -15,6 +15,7 @@ from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.shortcomings import shortcomings
 
 FORMAT = 1
+SUFFIX = ".neuralocks"
 KINDS = {
     "strands": ("encoder.onnx", "strand.onnx", "frame.onnx", "tail.onnx"),
     "rig": ("rig.onnx",),
@@ -59,7 +60,7 @@ def shipped(kind: str = "strands") -> Path:
     Raises:
         NeuralocksError: this installation lacks it.
     """
-    path = Path(__file__).parent / "shipped" / f"{kind}.neuralocks"
+    path = Path(__file__).parent / "shipped" / f"{kind}{SUFFIX}"
     if not path.is_file():
         raise NeuralocksError(
             f"{path.name}: the shipped model is missing from this installation; reinstall or give --model"
@@ -74,8 +75,8 @@ def named(path: str | os.PathLike) -> Path:
         NeuralocksError: it is not a model file's name.
     """
     path = Path(path)
-    if path.suffix != ".neuralocks":
-        raise NeuralocksError(f"{path}: a model file ends in .neuralocks; choose such a name")
+    if path.suffix != SUFFIX:
+        raise NeuralocksError(f"{path}: a model file ends in {SUFFIX}; choose such a name")
     return path
 
 

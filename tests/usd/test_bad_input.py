@@ -14,6 +14,7 @@ from usd.baking.bake import bake
 from usd.baking.join import join
 from usd.baking.spool import Spool
 from usd.review.inspect import inspect
+from usd.review.picture import preview
 from usd.shot.stage import read_shot
 
 from .shots import HAIR, SKIN, Recipe, edited, write_shot
@@ -24,6 +25,12 @@ def test_a_hair_file_in_place_of_a_stage_is_told_to_be_imported(tmp_path, model,
     (tmp_path / name).write_bytes(b"HAIR")
     with pytest.raises(NeuralocksError, match="is a hair file; make a USD groom of it with 'neuralocks import'"):
         bake(tmp_path / name, tmp_path / "out.usdc", model)
+
+
+def test_a_model_in_place_of_a_stage_is_told_where_it_goes(tmp_path, model):
+    for work in (lambda: bake(model, tmp_path / "out.usdc"), lambda: preview(model, tmp_path / "out.png")):
+        with pytest.raises(NeuralocksError, match="is a trained model, not a scene; name a USD file here"):
+            work()
 
 
 WRONG = {

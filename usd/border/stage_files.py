@@ -10,6 +10,7 @@ from pxr import Ar, Sdf, Tf, Usd
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.formats import EXTENSIONS
+from neuralocks_core.model import SUFFIX as MODEL
 
 from .damage import first_line, named
 from .stopping import check
@@ -32,6 +33,10 @@ def open_stage(path) -> Usd.Stage:
     if path.suffix.lower() in EXTENSIONS:
         raise NeuralocksError(
             f"{path}: is a hair file; make a USD groom of it with 'neuralocks import' and add that to a shot"
+        )
+    if path.suffix.lower() == MODEL:
+        raise NeuralocksError(
+            f"{path}: is a trained model, not a scene; name a USD file here, and the model with --model"
         )
     check()  # USD swallows Ctrl-C while it loads its modules
     try:
@@ -96,7 +101,7 @@ def check_not_input(out: Path, stage: Usd.Stage) -> None:
         NeuralocksError: `out` is one of them, under any name.
     """
     if any(one_file(out, path) for path in used_files(stage)):
-        raise NeuralocksError(f"{out}: is part of the shot itself; choose another name")
+        raise NeuralocksError(f"{out}: is read as well, as a file or a layer of it; choose another name")
 
 
 def check_not_over(out: Path, stage: Usd.Stage) -> None:

@@ -8,6 +8,7 @@ from neuralocks_core.boundary_spec import POSE_JOINTS
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
+from neuralocks_core.model import SUFFIX
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.rigging import assemble_rig
 
@@ -68,7 +69,7 @@ def inspect(path, head: str | None = None, joints: dict[str, str] | None = None)
     if not path.is_file():
         fact = "is not a file" if path.exists() else "no such file"
         raise NeuralocksError(f"{path}: {fact}; check the path")
-    if kind == ".neuralocks":
+    if kind == SUFFIX:
         return {"file": str(path), "kind": "model", **_model(path)}
     if kind == ".bvh":
         return {"file": str(path), "kind": "motion", **_motion(path)}
