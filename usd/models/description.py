@@ -70,9 +70,9 @@ _STRAND_PLACE = _PLACE + " (for hair carried by a joint below it: that of `canon
 _WIND = (
     "add the binned steps of T(R_head(t_k)) w(t_k) / 9.81 to those of f_k, with w(t) the acceleration of hair by the wind [m/s^2, "
     "world]; motion strength does not scale them. In a bake, w = m + gusts (a m + b s), with m the wind that it was given, s a "
-    f"level vector {ACROSS:g} times as long as m, towards (m.z, 0, -m.x), "
+    f"level vector {ACROSS:g} times as long as m, towards (m.z, 0, -m.x), or +X if m is vertical, "
     f"a and b the sums of c sin(2 pi f t + phase), c {_listed(SHARES)}, f {_listed(FREQUENCIES)} Hz, phases {_listed(PHASES[0])} and "
-    f"{_listed(PHASES[1])} rad; in a loop, f is rounded to whole turns"
+    f"{_listed(PHASES[1])} rad; in a loop, each f is rounded to whole turns in its length, one at least"
 )
 STRAND_INPUT = {
     "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(its `bind`) * inverse(`facing`), " + _SPACES,

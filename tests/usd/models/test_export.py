@@ -89,18 +89,24 @@ def test_a_rig_is_fed_as_its_description_says(tmp_path):
     assert turns == pytest.approx(ours, abs=1e-5)
 
 
-def test_the_winds_of_a_bake_are_described_for_others(tmp_path):
-    """Computed from the words alone; a model that feels none has no words for it."""
+@pytest.mark.parametrize(("mean", "period"), [((1.0, -2.0, 3.0), 0), ((1.0, -2.0, 3.0), 2.0), ((0.0, 3.0, 0.0), 0)])
+def test_the_winds_of_a_bake_are_described_for_others(tmp_path, mean, period):
+    """Computed from the words alone, also in a loop shorter than a gust; a model that feels none has no words for it."""
     export_model(model_file.shipped("strands"), tmp_path)
     told = json.loads((tmp_path / "description.json").read_text("utf-8"))["sliders"]["wind"]
     share = float(re.search(r"level vector ([\d.]+) times", told)[1])
     said = re.search(r"c ([\d., ]+), f ([\d., ]+) Hz, phases ([\d., ]+) and ([\d., ]+) rad", told)
     c, f, along, across = (np.array(part.split(", "), float) for part in said.groups())
-    wind, t = Wind((1.0, -2.0, 3.0), 0.7), np.linspace(0, 9, 50)[:, None]
+    if period:
+        least = re.search(r"in a loop, each f is rounded to whole turns in its length, (\w+) at least", told)[1]
+        f = np.maximum(np.round(f * period), {"one": 1}[least]) / period
+    wind, t = Wind(mean, 0.7), np.linspace(0, 9, 50)[:, None]
     a, b = ((c * np.sin(2 * np.pi * f * t + phase)).sum(axis=1)[:, None] for phase in (along, across))
-    m, side = np.array(wind.mean), np.array([3.0, 0.0, -1.0])
+    m, side = np.array(mean), np.array([mean[2], 0.0, -mean[0]])
+    if not side.any():
+        side = {"+X": np.array([1.0, 0.0, 0.0])}[re.search(r"or (\S+) if m is vertical", told)[1]]
     s = share * np.linalg.norm(m) * side / np.linalg.norm(side)
-    assert m + 0.7 * (a * m + b * s) == pytest.approx(wind.at(t[:, 0]), abs=1e-9)
+    assert m + 0.7 * (a * m + b * s) == pytest.approx(wind.at(t[:, 0], period), abs=1e-9)
     for static in (BoundarySpec(bins=()), BoundarySpec(linear="velocity")):
         path = write_random_model(tmp_path / "held.neuralocks", gain=1.0, spec=static)
         export_model(path, tmp_path / "held")
