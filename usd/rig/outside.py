@@ -14,15 +14,17 @@ from ..skel.stage_rig import StageRig
 
 def outside_notes(source: StageRig) -> list[str]:
     """The note on joints that are named like hair and drive skin, but are not below the head, for example below the neck. Those of
-    another head in the skeleton have their own note.
+    another head in the skeleton have their own note; those that an earlier bake moves need none.
     """
-    names, character = source.source.names, source.character
+    names, character, moved = source.source.names, source.character, source.source.baked_hair
     drives = np.zeros(len(names), bool)
     for mesh in source.meshes:
         drives[mesh.indices[mesh.weights > LEAST_WEIGHT]] = True
     beside = np.flatnonzero(drives & ~character.of_head)
     loose = [
-        names[j] for j in beside if says_hair_alone(names[j]) and "head" not in names[j].rpartition("/")[0].lower()
+        names[j]
+        for j in beside
+        if says_hair_alone(names[j]) and "head" not in names[j].rpartition("/")[0].lower() and names[j] not in moved
     ]
     if not loose:
         return []

@@ -181,12 +181,12 @@ def unlikely_head(rig: StageRig) -> list[str]:
 
 
 def another_head(rig: StageRig) -> list[str]:
-    """The note on hair joints of a second character in the skeleton."""
-    names, head = rig.source.names, rig.character.head
+    """The note on hair joints of a second character in the skeleton, if no bake moves them."""
+    names, head, moved = rig.source.names, rig.character.head, rig.source.baked_hair
     for joint in np.flatnonzero(~rig.character.skeleton.below(head)):
         *above, own = names[joint].split("/")
         heads = [name for name in above if "head" in name.lower()]
-        if heads and says_hair(own):
+        if heads and says_hair(own) and names[joint] not in moved:
             return [
                 f"{rig.path}: '{own}' hangs from '{heads[-1]}', not from '{leaf(names[head])}', so it is not moved; "
                 f"take that head with --head {heads[-1]}"

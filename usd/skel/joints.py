@@ -17,7 +17,7 @@ from neuralocks_core.rotation import from_quaternion, relative_to_parents
 from ..border.arrays import wxyz
 from ..border.placement import Placement
 from ..border.values import as_names, as_numbers
-from .rig_copy import source_of
+from .rig_copy import hair_of, source_of
 
 STRETCH = 0.003
 """A quaternion's length may be off by this much without a note: single and half precision are nearer."""
@@ -95,6 +95,12 @@ class JointSource:
     def moves_joints(self) -> bool:
         """Whether a SkelAnimation gives the pose; otherwise UsdSkel shows the rest pose."""
         return self._columns is not None
+
+    @property
+    def baked_hair(self) -> tuple[str, ...]:
+        """The joints that a rig bake of this stage moves."""
+        bake = self.copied or self.animation
+        return hair_of(bake) if bake else ()
 
     def posed(self, time_codes) -> np.ndarray:
         """Joints (T, J, 4, 4) in stage world space at time codes (T,), as UsdSkel evaluates them."""

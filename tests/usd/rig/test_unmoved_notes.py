@@ -138,3 +138,37 @@ def test_a_model_of_hair_on_the_neck_needs_the_head_that_it_was_trained_with(edi
         NeuralocksError, match="'pony' does not hang .*, but from 'neck': name that with --head neck, as"
     ):
         bake_rig(shot, tmp_path / "out.usda", model_for(hair))
+
+
+@pytest.mark.parametrize(
+    ("joints", "first", "told"),
+    [
+        (
+            ["neck", "neck/head", "neck/head/hair_0", "neck/head/hair_0/end", "neck/pony", "neck/pony/end"],
+            {"head": "neck", "chains": ["pony"]},
+            "'pony' hangs from 'neck' and is not moved",
+        ),
+        (
+            ["head_1", "head_1/hair_0", "head_1/hair_0/end", "head_2", "head_2/curl", "head_2/curl/end"],
+            {"head": "head_2"},
+            "'curl' hangs from 'head_2', not from 'head_1', so it is not moved",
+        ),
+    ],
+)
+def test_hair_that_an_earlier_bake_moves_is_not_called_unmoved(edited, tmp_path, joints, first, told):
+    """Each head's hair needs a model and a bake of its own, one over the other."""
+
+    def change(stage):
+        _named(*joints)(stage)
+        rotations = stage.GetPrimAtPath("/Who/Motion").GetAttribute("rotations")
+        for code in rotations.GetTimeSamples():  # of any head
+            rotations.Set([rotations.Get(code)[1]] * len(joints), code)
+
+    shot, one, two = edited(change), tmp_path / "one.usda", tmp_path / "two.usda"
+    head = next(joint for joint in joints if joint.endswith("/hair_0")).split("/")[-2]
+    model = model_for(read_rigged_hair(shot, head=head, chains=["hair_0"]))
+    assert any(told in note for note in bake_rig(shot, two, model, head=head).notes)
+    bake_rig(shot, one, model_for(read_rigged_hair(shot, **first)), head=first["head"])
+    baked = bake_rig(one, two, model, head=head).notes
+    for notes in (baked, rigged_notes(read_rigged_hair(two, head=head, chains=["hair_0"]).source)):
+        assert not any("not moved" in note for note in notes)
