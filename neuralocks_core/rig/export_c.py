@@ -3,6 +3,7 @@
 
 import hashlib
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -201,7 +202,14 @@ def _parts_for(model: RigModel, text: str) -> str:
 
 def _example(model: RigModel, header: str, prefix: str) -> str:
     text = _parts_for(model, (_TEXTS / "example.c.in").read_text(encoding="utf-8"))
-    names = {"HEADER": header, "STEM": Path(header).stem, "PREFIX": prefix, "UPPER": prefix.upper()}
+    beside = example_beside(Path(header))
+    names = {
+        "HEADER": header,
+        "SOURCE": shlex.quote(beside.name),
+        "PROGRAM": shlex.quote(beside.stem),
+        "PREFIX": prefix,
+        "UPPER": prefix.upper(),
+    }
     return re.sub("@([A-Z]+)@", lambda m: names[m[1]], text)
 
 

@@ -107,9 +107,10 @@ def test_what_no_header_computes_is_refused(tmp_path):
 
 
 @pytest.mark.skipif(not shutil.which("cc"), reason="no cc here")
-def test_the_example_is_built_by_the_line_that_it_gives(tmp_path):
-    export_c(random_model(), tmp_path / "braid.h")
-    command = re.search(r"cc -std=c99 .*", (tmp_path / "braid_example.c").read_text())[0]
+@pytest.mark.parametrize("name", ["braid", "long hair (1)"])
+def test_the_example_is_built_by_the_line_that_it_gives(tmp_path, name):
+    export_c(random_model(), tmp_path / f"{name}.h")
+    command = re.search(r"cc -std=c99 .*", (tmp_path / f"{name}_example.c").read_text())[0]
     done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0 and "turns by" in done.stdout, done.stderr
 
