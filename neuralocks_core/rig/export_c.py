@@ -236,8 +236,10 @@ def _facing(model: RigModel) -> str:
 
 
 def _plain(text: str) -> str:
-    """Text that is safe in a comment, whoever made the model, in plain ASCII: a compiler may read it in any code page."""
-    return re.sub(r"[^\w ,.:-]", "_", text[:300]).encode("ascii", "backslashreplace").decode()
+    """A list that is safe in a comment, whoever made the model, in plain ASCII: a compiler may read it in any code page."""
+    if len(text) > 300:
+        text = f"{text[:300].rpartition(', ')[0] or text[:300]}, ..."
+    return re.sub(r"[^\w ,.:-]", "_", text).encode("ascii", "backslashreplace").decode()
 
 
 def _float(value) -> str:

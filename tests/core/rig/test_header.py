@@ -167,6 +167,15 @@ int main(void) {
     assert "as they are named in its rig: head __ int y_ __, neck \\u9996\n" in header
 
 
+def test_a_long_list_of_chains_ends_after_a_whole_name(tmp_path):
+    """And says that it goes on: nobody should look for a joint by half of a name."""
+    model = random_model((1,) * 60)
+    export_c(model, tmp_path / "hair.h")
+    *listed, last = re.search(r"; chains: (.*)", (tmp_path / "hair.h").read_text())[1].split(", ")
+    assert last == "..." and 10 < len(listed) < 60
+    assert listed == model.chains.tops[: len(listed)]
+
+
 BIND_HARNESS = """#include "hair.h"
 #include <stdio.h>
 int main(void) {
