@@ -97,7 +97,7 @@ class GroomPoser:
 
     def _displacement(self, time_code: float, joints: np.ndarray) -> np.ndarray:
         moved = self._session.displacement(self._vector(time_code, joints))
-        shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
+        shape = self._rig.shape_at(time_code)
         self._skin.carry(moved, shape, lambda moved: self._push(moved, joints, shape))
         if self._resolvers and moved.nbytes > LARGE:
             give_back()  # 20 MB for a few percent of the time: this frame is written while the next one is posed

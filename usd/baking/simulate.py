@@ -123,7 +123,7 @@ class _SimulatedPoser:
     def points(self, time_code: float) -> np.ndarray:
         """(P, 3) float32, in the prim's own space and units."""
         joints, row = self._rig.joints_at(time_code), self._moved[self._row[time_code]]
-        shape = self._rig.clip.shape_at(self._rig.border.seconds([time_code]))[0]
+        shape = self._rig.shape_at(time_code)
         moved = np.empty((len(self._chosen) + len(self._others), *row.shape[1:]), np.float32)
         moved[self._chosen], moved[self._others] = row, row[self._nearest]
         self._skin.carry(moved, shape, lambda moved: self._push(moved, joints, shape))

@@ -74,8 +74,7 @@ class Baked:
 
         def pose(frame: int) -> np.ndarray:
             code = self.codes[frame]
-            shape = rig.clip.shape_at(self.times[frame : frame + 1])[0]
-            return character.posed_body(rig.joints_at(code), shape)
+            return character.posed_body(rig.joints_at(code), rig.shape_at(code))
 
         return Scene(
             times=self.times,

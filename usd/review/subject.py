@@ -48,8 +48,8 @@ class Subject:
         self.baked, self.item, self.say = baked, item, say
         self.character, groom = item.attachment.character, item.groom
         every = strands_on(self.character, groom)
-        clip = item.attachment.rig.clip
-        skin, shapes = RootSkin(self.character, [every], clip), clip.shape_at(baked.times)
+        rig = item.attachment.rig
+        skin, shapes = RootSkin(self.character, [every], rig.clip), [rig.shape_at(code) for code in baked.codes]
         begun = skin.begun(every)
         # The solver moves the strands that seed 0 chooses; another seed also measures strands that follow them.
         self.chosen = every.whole_locks(STRANDS, seed=int("solver" in recorded(item.prim)))
@@ -150,7 +150,7 @@ class Subject:
         rig, baked = self.item.attachment.rig, self.baked
         at_rest = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
         every = np.arange(len(baked.codes))
-        joints, shapes = [rig.joints_at(code) for code in baked.codes], rig.clip.shape_at(baked.times)
+        joints, shapes = ([at(code) for code in baked.codes] for at in (rig.joints_at, rig.shape_at))
 
         def roughly(frame: int) -> float:
             distance = resolver.rough_distance(self.own[frame], joints[frame], shapes[frame])

@@ -76,6 +76,12 @@ def shares(weights: np.ndarray, knots: list[float]) -> np.ndarray:
     return result[:, points != 0]
 
 
+def all_shares(weights: np.ndarray, knots: dict[str, list[float]]) -> np.ndarray:
+    """The `shares` (T, B) of several shapes, one after the other, at the weights (T, len(knots)) of each."""
+    each = (shares(column, own) for column, own in zip(weights.T, knots.values(), strict=True))
+    return np.concatenate([np.zeros((len(weights), 0)), *each], axis=1)
+
+
 def at_knot(shape: Knots, knot: float) -> np.ndarray:
     """Offsets (V, 3) of one mesh's shape at a knot that may be another mesh's."""
     return np.einsum("k,kvc->vc", shares(np.array([knot]), list(shape))[0], np.stack(list(shape.values())))

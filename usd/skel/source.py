@@ -16,7 +16,7 @@ from neuralocks_core.motion import Clip
 from ..border.amounts import joints_by_hand
 from ..border.units import Border
 from .bind_world import to_bind_world
-from .blend_shapes import knot_weights, shares
+from .blend_shapes import all_shares, knot_weights
 from .clip_codes import clip_codes
 from .joints import JointSource
 from .rig_copy import alike, hair_of, source_of
@@ -77,14 +77,15 @@ def read_rig(
     trim = joint_trim(source, to_bind)
     skeleton = Skeleton(source.names, source.parents, to_bind @ source.bind @ trim)
     knots = knot_weights([mesh.shapes for mesh in meshes])
-    weights = dict(zip(knots, source.shape(list(knots), time_codes).T, strict=True))
-    used = {name: column for name, column in weights.items() if all_shapes or column.any()}
-    body = merged_body(meshes, to_bind, set(used))
+    weights = source.shape(list(knots), time_codes)
+    used = weights.any(axis=0) | all_shapes
+    knots = {name: own for (name, own), kept in zip(knots.items(), used, strict=True) if kept}
+    body = merged_body(meshes, to_bind, set(knots))
     character = Character(skeleton, body, humanoid)
     clip = Clip(
         border.seconds(time_codes),
         border.to_core @ posed @ trim,
-        np.concatenate([np.zeros((len(posed), 0)), *(shares(w, knots[name]) for name, w in used.items())], axis=1),
+        all_shares(weights[:, used], knots),
     )
     if cuts is not None:
         known = border.seconds([cut for cut in sorted(cuts) if time_codes[0] < cut <= time_codes[-1]])
@@ -100,6 +101,7 @@ def read_rig(
         character=character,
         clip=clip,
         time_codes=time_codes,
+        knots=knots,
         notes=notes,
         by_hand=by_hand,
     )

@@ -14,6 +14,7 @@ from neuralocks_core.motion import LOOP_GAP, Clip
 from neuralocks_core.rotation import angle_between, flat, polar
 
 from ..border.units import Border
+from .blend_shapes import all_shares
 from .joints import JointSource
 from .motion_sketch import motion_sketch
 from .skin import Skin
@@ -33,6 +34,7 @@ class StageRig:
         character: in core axes and metres.
         clip: world joint transforms at the time codes `time_codes`.
         time_codes: (T,).
+        knots: blend shapes of the body, by name, with their `knot_weights`.
         notes: what a user should know about it.
         by_hand: semantic joint -> joint, as the user named them.
     """
@@ -45,6 +47,7 @@ class StageRig:
     character: Character = field(repr=False)
     clip: Clip = field(repr=False)
     time_codes: np.ndarray = field(repr=False)
+    knots: dict[str, list[float]] = field(repr=False)
     notes: list[str] = field(repr=False)
     by_hand: dict[str, str] = field(default_factory=dict, repr=False)
     _carrying: dict[tuple[int, float], np.ndarray] = field(default_factory=dict, repr=False, compare=False)
@@ -63,6 +66,12 @@ class StageRig:
     def joints_at(self, time_code: float) -> np.ndarray:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
         return self._to_world @ self.source.posed([time_code])[0] @ self._trim
+
+    def shape_at(self, time_code: float) -> np.ndarray:
+        """Blend shape weights (B,) as a renderer sees them at a time code: between samples of the clip, the way from one to the next
+        may lead past an inbetween, or step.
+        """
+        return all_shares(self.source.shape(list(self.knots), [time_code]), self.knots)[0]
 
     def authored_turns(self, joints: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Turns (..., N, 4) wxyz of joints (N,) in the bind axes that the file gives them, from those in the core's: a turn about

@@ -55,6 +55,29 @@ def test_hair_rides_on_a_face_that_moves(tmp_path, still_model, resolve):
     np.testing.assert_array_equal(samples(moving.path, "points", at=1), samples(still.path, "points", at=1))
 
 
+def test_hair_rides_on_skin_between_samples_as_usd_skel_moves_it(tmp_path, still_model):
+    """Past an inbetween, and up to a step between two samples close to each other."""
+    weights = {1: 0.0, 3: 1.0, 4.999: 1.0, 5: 0.0, LAST: 0.0}
+    way = np.array([0.01, 0.0, 0.0])
+    shot = face(tmp_path, weights, way)
+    stage = Usd.Stage.Open(str(shot))
+    shape = UsdSkel.BlendShape(stage.GetPrimAtPath("/Hero/Skin/Moved"))
+    middle = shape.CreateInbetween("middle")
+    middle.SetWeight(0.7)
+    middle.SetOffsets(Vt.Vec3fArray.FromNumpy(-np.array(shape.GetOffsetsAttr().Get())))
+    stage.Save()
+    codes = [1, 2.25, 2.4, 2.7, 4.6, 5]
+    moving = bake(shot, tmp_path / "moving.usdc", still_model, frames=codes, resolve=False).path
+    (tmp_path / "still").mkdir()
+    still = face(tmp_path / "still", {1: 0.0}, way)
+    still = bake(still, tmp_path / "still.usdc", still_model, frames=codes, resolve=False).path
+    for code in codes:
+        weight = np.interp(code, list(weights), list(weights.values()))
+        expected = 0.01 * np.interp(weight, [0, 0.7, 1], [0, -1, 1])
+        moved = world_points(moving, code) - world_points(still, code)
+        np.testing.assert_allclose(np.linalg.norm(moved, axis=1), abs(expected), atol=1e-5)
+
+
 def test_hair_lies_on_a_head_larger_than_it_was_groomed_on(tmp_path, still_model):
     out = bake(face(tmp_path, {1: 1.0}), tmp_path / "out.usdc", still_model, resolve=False).path
     roots = world_points(out, 1).reshape(12, 12, 3)[:, 0]
