@@ -18,6 +18,9 @@ OWN = ("groom_version_major", "groom_version_minor", "groom_tool")
 """Primvars that say what wrote the file."""
 READ = ("widths", rest_copy.NAME)
 """Primvars that are read into the groom."""
+WIDTH = "groom_width"
+"""Widths once more [cm], which every import writes from those of the groom: an old one would keep the size that the hair had
+before a unit or a head changed it."""
 OF_A_SPACE = (Sdf.ValueRoleNames.Point, Sdf.ValueRoleNames.Vector, Sdf.ValueRoleNames.Normal, Sdf.ValueRoleNames.Frame)
 """Roles of values that belong to the space which the curves come from."""
 
@@ -78,9 +81,12 @@ def _read_primvars(prim: Usd.Prim, groom: Groom, notes: list[str]) -> tuple[Prim
         "vertex": {len(groom.points)},
         "varying": _varying_sizes(UsdGeom.BasisCurves(prim), len(groom.points)),
     }
-    for primvar in UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance():
+    api = UsdGeom.PrimvarsAPI(prim)
+    sized = UsdGeom.BasisCurves(prim).GetWidthsAttr().HasAuthoredValue() or api.HasPrimvar("widths")
+    written = OWN + READ + ((WIDTH,) if sized else ())
+    for primvar in api.FindPrimvarsWithInheritance():
         name, scope, each = str(primvar.GetPrimvarName()), str(primvar.GetInterpolation()), primvar.GetElementSize()
-        if not primvar.HasAuthoredValue() or name in OWN + READ or name.startswith("skel:"):
+        if not primvar.HasAuthoredValue() or name in written or name.startswith("skel:"):
             continue
         value = rest_primvar(primvar)
         fits = np.shape(value)[:1] in [(many * each,) for many in sizes.get(scope, ())]

@@ -96,3 +96,20 @@ def test_what_does_not_go_on_is_told(imported):
         "/Hero/Hair: primvars:map names files, whose paths may not resolve from elsewhere; left out",
     ]
     assert not any(UsdGeom.PrimvarsAPI(prim).HasPrimvar(name) for name in ("Pref", "map", "few"))
+
+
+@pytest.mark.parametrize("unit, centimetres", [(None, 0.01), ("mm", 0.001)])
+def test_the_width_that_other_tools_read_is_that_of_the_hair_as_imported(tmp_path, unit, centimetres):
+    """An import writes it, so a groom that was imported before has one already."""
+    first, second = tmp_path / "first.usda", tmp_path / "second.usda"
+    import_groom(write_shot(tmp_path, Recipe(unit=0.01)), first)
+    stage = Usd.Stage.Open(str(first))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Groom")).AddScaleOp().Set((100, 100, 100))
+    stage.GetRootLayer().Save()
+    import_groom(first, second, unit)
+    stage = Usd.Stage.Open(str(second))
+    hair = stage.GetPrimAtPath("/Groom/Hair")
+    width = UsdGeom.PrimvarsAPI(hair).GetPrimvar("groom_width").Get()
+    np.testing.assert_allclose(width, centimetres, rtol=1e-5)
+    np.testing.assert_allclose(width, 100 * np.array(UsdGeom.BasisCurves(hair).GetWidthsAttr().Get()), rtol=1e-6)
