@@ -8,7 +8,7 @@ their roots on skin.
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pxr import Usd
@@ -29,6 +29,9 @@ CLEARLY = 2
 """Hair must be this many times nearer to skin by a less likely way than by a likelier one for the former to count: hair that hovers
 over skin may come a little nearer by a wrong way, such as one that counts a parent's scale twice.
 """
+OFF_FACES, SURELY = 3e-3, 4
+"""Roots that a likely way puts near skin, but the former [m] or more from its faces in the median, are taken by another way if that
+brings them this many times nearer to faces."""
 SOME_ROOTS, SOME_TIMES = 1000, 16
 """About how many of a groom's roots and of a prim's samples are looked at: all would be too many."""
 
@@ -113,12 +116,27 @@ def _find_seat(
         return Seat(middle, rig, mesh, to_bind, way, placed, skin) if better else best
 
     for likely in (True, False):
+        if best is not None and best.distance <= NEAR:
+            return _on_faces(best, roots, when, placement, drifts) or best
         for mesh, skin in zip(rig.meshes, rig.skins, strict=True):
             for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely, drifts=drifts)):
                 best = nearest(best, mesh, skin, (not likely, place), to_bind)
-        if best is not None and best.distance <= NEAR:
-            break
     return best if best is not None and best.distance <= within else None
+
+
+def _on_faces(seat: Seat, roots: np.ndarray, when: float | None, placement: Placement, drifts) -> Seat | None:
+    """The seat by an unlikely way that puts roots right onto the skin, near which they only are by the likely one; None if there is
+    none. A head that turns by a few degrees before the shot begins leaves hair near its skin, but moved along it by centimetres.
+    """
+    rig = seat.rig
+    for place, to_bind in enumerate(ways(rig, seat.mesh, placement, when, likely=False, drifts=drifts)):
+        placed = transformed(roots, to_bind)
+        middle = float(np.median(seat.skin.query(placed, seat.distance)[0]))
+        if np.isfinite(middle) and rig.surface is not None:
+            on, off = (float(np.median(np.abs(rig.surface.distance(each)[0]))) for each in (placed, seat.roots))
+            if off >= max(OFF_FACES, SURELY * on):
+                return replace(seat, distance=middle, to_bind=to_bind, way=(True, place), roots=placed)
+    return None
 
 
 def ways(

@@ -161,6 +161,27 @@ def test_hair_made_where_the_character_stands_first_and_hair_off_the_skin(tmp_pa
     assert 0.1 < float(said.split(" m from")[0].split()[-1]) < 0.3
 
 
+@pytest.mark.parametrize("off", [0.0, 0.005])
+def test_hair_made_near_its_place_in_the_bind_pose_lies_where_it_is_on_the_skin(tmp_path, off):
+    """If the head has moved by less than the distance within which hair sits on it; but not where it touches neither."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    still = np.asarray(motion.GetTranslationsAttr().Get(1))
+    way = np.array([0.012, 0.0, 0.012])
+    for code in range(1, 10):
+        motion.GetRotationsAttr().Set(Vt.QuatfArray([Gf.Quatf(1)] * len(still)), code)
+        moved = still + way * (np.arange(len(still)) == 0)[:, None] * (1 + 0.1 * (code - 1))
+        motion.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(moved.astype(np.float32)), code)
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    rest = np.asarray(points.Get())
+    made = CENTRE + (rest - CENTRE) * (1 + off / 0.1)
+    points.Set(Vt.Vec3fArray.FromNumpy((made + way).astype(np.float32)))
+    stage.Save()
+    (item,) = read_shot(path).grooms
+    np.testing.assert_allclose(item.groom.points, made + way * bool(off), atol=1e-6)
+
+
 @pytest.mark.parametrize("bound", ["mesh", "none"])
 def test_hair_made_at_the_shots_first_frame_after_a_run_up(tmp_path, bound):
     """If it was made for a frame in between, a note says so, although its user named it."""
