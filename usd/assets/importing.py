@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, UsdGeom, Vt
+from pxr import Sdf, Usd, UsdGeom, Vt
 
 from neuralocks_core.deformation.freeing import freed
 from neuralocks_core.errors import NeuralocksError, about
@@ -23,6 +23,7 @@ from ..shot.curves import find_curves, read_groom
 from ..shot.notes import few, first_of, unlikely_head
 from ..shot.stage import read_rigs
 from ..skel.stage_rig import StageRig
+from ..skel.surface import bound_skeleton, geom_bind
 from .beside import Beside, Primvar, read_beside
 from .groom import Authored, Over, write_grooms
 from .grow import Barber
@@ -157,6 +158,14 @@ def _primvars(look: Look) -> tuple[Primvar, ...]:
     return tuple(found)
 
 
+def _place(prim: Usd.Prim) -> np.ndarray:
+    """Where the stage shows curves at rest, (4, 4): of those bound to a skeleton, skinning ignores the prim's own transform."""
+    skeleton = bound_skeleton(prim)
+    if skeleton is None:
+        return Placement(prim).reference
+    return Placement(prim.GetStage().GetPrimAtPath(skeleton)).reference @ geom_bind(prim)
+
+
 @names_damage
 def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
     stage = open_stage(source)
@@ -167,7 +176,7 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
     found, notes, left = [], [], []
     for prim in find_curves(stage):
         curves = UsdGeom.BasisCurves(prim)
-        groom = read_groom(prim, border.to_core @ Placement(prim).reference, notes)
+        groom = read_groom(prim, border.to_core @ _place(prim), notes)
         tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
         found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left)))
     if not found:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.body.head_field import HeadField
 from neuralocks_core.errors import NeuralocksError
@@ -22,7 +22,7 @@ from usd.review.evaluate import evaluate
 from usd.shot.stage import read_rigs, read_shot
 
 from ..commands import status
-from ..shots import Recipe, world_points, write_shot
+from ..shots import Recipe, edited, strand_points, world_points, write_shot
 
 SHOT = Path(__file__).resolve().parents[3] / "examples" / "shot" / "shot.usda"
 BODY = SHOT.with_name("body.usdc")
@@ -130,6 +130,24 @@ def test_parts_in_one_unknown_unit_keep_together(tmp_path):
     assert size[0] > 15 * size[1] and size[2] > 5 * size[1]
     (told,) = [note for note in notes if "unit" in note]
     assert told.startswith(f"{files[0]}, {files[1]}: do not state their unit; took 1 mm, by which the scalp is ")
+
+
+def test_hair_that_a_skeleton_carries_is_imported_where_skinning_shows_it(tmp_path):
+    """Its own space is tied to the skeleton by the geomBindTransform; the prim's transform does not count."""
+    rest = strand_points(6, 4).reshape(-1, 3)
+
+    def change(stage):
+        hair, bind = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")), Gf.Matrix4d().SetScale(0.01)
+        bind.SetTranslateOnly((0, 1, 0))
+        hair.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy((100 * (rest - [0, 1, 0])).astype(np.float32)))
+        hair.GetWidthsAttr().Set([0.01])
+        hair.AddTranslateOp().Set((0, 7, 0))
+        UsdSkel.BindingAPI(hair).GetGeomBindTransformAttr().Set(bind)
+        UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Rig")).AddTranslateOp().Set((3, 0, 0))
+
+    (groom,), _ = import_groom(edited(tmp_path, change, Recipe(strands=6, vertices=4)), tmp_path / "groom.usda")
+    np.testing.assert_allclose(groom.points, rest + [3, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(groom.widths, 1e-4, rtol=1e-5)
 
 
 def test_a_range_that_the_character_lacks_is_not_made_up(tmp_path):
