@@ -200,6 +200,10 @@ def cannot_write(path: str | os.PathLike, error: OSError) -> CannotWrite:
     """The one-line error for a file system that refuses."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return CannotWrite(f"{path}: no space left on the disk; free some, or choose another folder")
+    if error.errno == errno.ENAMETOOLONG:
+        return CannotWrite(
+            f"{path}: its name is too long for this disk, with what is added to it meanwhile; choose a shorter one"
+        )
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         return CannotWrite(f"{path}: there is a file, not a folder, on the way; choose another folder")
     if _HOLDS_OPEN_FILES and isinstance(error, PermissionError) and os.path.exists(path):

@@ -202,7 +202,10 @@ class Spool:
 def kept(out: Path) -> int:
     """How many finished frames of an interrupted bake are beside its output, counted for each batch of grooms."""
     folder = _folder(out)
-    frames, layers = (sum(1 for _ in folder.glob(f"*.{ending}")) for ending in ("frame", "part.usdc"))
+    try:
+        frames, layers = (sum(1 for _ in folder.glob(f"*.{ending}")) for ending in ("frame", "part.usdc"))
+    except OSError:  # a name too long for a folder
+        return 0
     return frames + (spent_frames(folder / _LOG) if layers else 0)
 
 
