@@ -131,6 +131,8 @@ class Session:
     failed: set[str] = field(default_factory=set)
     """Armatures that could not be sampled in the background; tried again when they, a rest pose or an action change."""
 
+    files: int = 0
+    """How many files were opened before the one that is open."""
     opened: dict[str, tuple[int, int]] = field(default_factory=dict)
     """First and last frame of each scene when its file was opened."""
     renewed: set[str] = field(default_factory=set)
@@ -183,7 +185,7 @@ class Session:
     def clear(self) -> None:
         """Forget everything, at file load and when the add-on is disabled; whoever is stepping frames must still end that."""
         self.stop_preparing_all()
-        self.__init__(paused=self.paused, working=self.working)
+        self.__init__(paused=self.paused, working=self.working, files=self.files + 1)
 
     def tell(self, name: str, error: Exception) -> None:
         """Say in the panel what went wrong with an object; what its user cannot fix is on the console as well."""

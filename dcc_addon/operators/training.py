@@ -180,6 +180,11 @@ class _Target(NamedTuple):
             thing = find(self.name)
         return thing
 
+    def followed(self) -> "_Target":
+        """The same, by the name and in the file that the object has now: that file may be reopened before the training ends."""
+        thing = identified(self.identity)
+        return self if thing is None else self.of(thing, self.kind)
+
 
 class _Training(NamedTuple):
     """A running process, what it is for, the folder with what it reads, and the objects of the prims in it."""
@@ -237,6 +242,7 @@ def watch() -> float | None:
     running = job()
     if running is None:
         return None
+    _running[0] = _running[0]._replace(target=_running[0].target.followed())
     if not running.running:
         finish()
         return None

@@ -5,6 +5,8 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..session import session
+
 
 def find(name_full: str):
     """The object of this full name, or None."""
@@ -25,7 +27,7 @@ def identity(thing):
     not number data blocks, and there an undo may change it.
     """
     number = getattr(thing, "session_uid", None)
-    return (bpy.data.filepath, thing.as_pointer()) if number is None else number
+    return (session.files, thing.as_pointer()) if number is None else number
 
 
 def identified(number):

@@ -143,6 +143,28 @@ def training_meanwhile(folder: Path) -> None:
     assert bpy.data.objects["Hair"].neuralocks_hair.model == "//Hair_3.neuralocks"
 
 
+def saved_in_training(folder: Path) -> None:
+    """The file may be saved under another name meanwhile, and the hair renamed: the model goes to the hair there, also if that file
+    is reopened.
+    """
+    from dcc_addon.models import model_path
+    from dcc_addon.operators import training as operator
+
+    strands, other = _in_training(folder), folder / "other"
+    other.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(other / "later.blend"))
+    assert _ended() == ("Hair: trained", True)
+    assert Path(model_path(strands)).samefile(folder / "Hair_1.neuralocks")
+
+    strands = _in_training(folder)
+    strands.name = "Wig"
+    bpy.ops.wm.save_as_mainfile(filepath=str(other / "later.blend"))
+    assert operator.watch() and operator.job()  # as Blender's timer calls it where there is a window
+    bpy.ops.wm.open_mainfile(filepath=str(other / "later.blend"))
+    assert _ended() == ("Wig: trained", True)
+    assert Path(model_path(bpy.data.objects["Wig"])).samefile(folder / "Hair_2.neuralocks")
+
+
 def trained_in_a_shot(folder: Path) -> None:
     """The model of overridden hair is found, even if the hair's own file names one by the same relative path."""
     from dcc_addon.models import model_path
