@@ -15,6 +15,8 @@ from .scene.appended import remake
 from .scene.carried import bodies_of
 from .scene.last_called import go_last, others_called
 from .scene.layers import working_in
+from .scene.lively import lively
+from .scene.locked import lock
 from .scene.save_as import Remade
 from .scene.together import drawn_with
 from .scene.up_to_date import ensure
@@ -78,6 +80,9 @@ def on_load(*_):
     if bpy.data.filepath:
         session.opened = {scene.name_full: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
     renewed.compare()
+    own = lively(bpy.data.objects)
+    if own.hairs or own.armatures:
+        lock()
     for scene in bpy.data.scenes:
         if live.needs_sampling(scene):
             background.request()

@@ -9,6 +9,7 @@ from . import live_rig, live_strands
 from .scene.guests import guests
 from .scene.layers import elsewhere, graph_of, layer_of
 from .scene.lively import lively
+from .scene.locked import lock
 from .scene.lookup import find, in_scene
 from .scene.sampling import key_of
 from .session import session
@@ -18,6 +19,7 @@ def strands_toggled(hair, context, wait: bool) -> None:
     """The Live switch of strands was used; `wait` as for `update`."""
     session.forget(hair.name_full)
     if hair.neuralocks_hair.live:
+        lock()
         refresh(context.scene, wait)
     else:
         live_strands.rest(hair)
@@ -27,6 +29,7 @@ def rig_toggled(armature, context) -> None:
     """The Live switch of the hair bones was used."""
     session.messages.pop(armature.name_full, None)
     if armature.neuralocks_character.rig_live:
+        lock()
         refresh(context.scene)
     else:
         live_rig.rest(armature)

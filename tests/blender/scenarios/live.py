@@ -138,6 +138,34 @@ def rendering(folder: Path) -> None:
     assert apart(points_at(strands, 4), after) < SAME, "the render used a motion that was out of date"
 
 
+def interface_locked(folder: Path) -> None:
+    """A render from a window moves live hair in its own thread, so the interface is locked meanwhile, in any scene of the file: from
+    when Live goes on, of strands or of bones, and in files that were saved otherwise; never without Live.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    strands = scenes.hair(rig, 20)
+    bpy.data.scenes.new("Other")
+
+    def unlocked():
+        return [scene.name for scene in bpy.data.scenes if not scene.render.use_lock_interface]
+
+    for settings, live in ((strands.neuralocks_hair, "live"), (rig.neuralocks_character, "rig_live")):
+        for scene in bpy.data.scenes:
+            scene.render.use_lock_interface = False
+        setattr(settings, live, False)
+        assert len(unlocked()) == 2
+        setattr(settings, live, True)
+        assert not unlocked()
+    for hair, bones in ((True, False), (False, True), (False, False)):
+        bpy.data.objects["Hair"].neuralocks_hair.live = hair
+        bpy.data.objects["Rig"].neuralocks_character.rig_live = bones
+        for scene in bpy.data.scenes:
+            scene.render.use_lock_interface = False
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "unlocked.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(folder / "unlocked.blend"))
+        assert len(unlocked()) == (0 if hair or bones else 2)
+
+
 def two_characters(_folder: Path) -> None:
     """Both live, each with its own hair; deleting one leaves the other alive and the hair at rest."""
     first, second = scenes.armature("Anna"), scenes.armature("Ben")
