@@ -101,7 +101,7 @@ class MomentPool:
         return moments, [self.hair[moment.hair] for moment in moments]
 
     def _add(self, index: int) -> None:
-        maker, draw, dt = self._maker, self._maker.draw(index), self.scene.spec.dt
+        maker, draw = self._maker, self._maker.draw(index)
         draw = replace(draw, materials=tuple(replace(material, weight=1.0) for material in draw.materials))
         character, groom = self.scene.character, self.scene.grooms[draw.groom]
         vectors, bind = maker.vectors(draw, self.scene.spec)
@@ -109,8 +109,7 @@ class MomentPool:
         self.hair.append(self._hair(draw, groom, rest, bind))
         rng = np.random.default_rng([self.scene.seed, 1, index])
         late = rng.integers(max(draw.first, 2), len(draw.times), size=MOMENTS)
-        # Head poses between samples of the clip are interpolated as for the boundary vectors, at the model's own steps.
-        joints = draw.clip.at(draw.times[0] + dt * np.arange(len(draw.times)))
+        joints = draw.joints(character)
         head = character.canonical_to_world(joints)
         now = np.linalg.inv(head[late])
         back = np.stack([now @ head[late - 1], now @ head[late - 2]], axis=1)

@@ -12,12 +12,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary import BoundarySampler, joints_read
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.materials import RANGES, Material, at_weight_one
 from neuralocks_core.measures import body_measures
 from neuralocks_core.motion import Clip
+from neuralocks_core.smooth_motion import SmoothMotion
+from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
@@ -100,7 +102,7 @@ class Draw:
         materials: of each strand, the same within a lock: one motion covers many materials at the cost of one. All have one
             weight, which says at what speed the motion is read.
         shape: blend shape weights.
-        clip: the motion.
+        clip: the motion, without cuts; if it is on twos, the smooth motion through its poses.
         times: (T,) [s].
         first: first frame to learn from.
     """
@@ -113,6 +115,12 @@ class Draw:
     times: np.ndarray
     first: int
 
+    def joints(self, character: Character) -> np.ndarray:
+        """World joint transforms (T, J, 4, 4) at its times, smooth between the clip's samples as its boundary vectors are: hair that
+        felt a blow at each sample could not be learned from them.
+        """
+        return SmoothMotion(character, self.clip).at(self.times)
+
 
 class RolloutMaker:
     """Makes the rollouts of a scene; what all of them share is computed once."""
@@ -122,6 +130,9 @@ class RolloutMaker:
         lowest = min(groom.rest[..., 1].min() for groom in scene.grooms)
         self.body = hair_body(scene.character, reach=0.2 - float(lowest))
         self._usable = [held_out_split(groom, scene.held_out) for groom in scene.grooms]
+        read = joints_read(scene.character)
+        captured = [Stepped.of(part, read).clip for clip in scene.clips for part in clip.parts]
+        self._captured = [] if scene.held_out else captured
         self._surface = None
         if scene.character.body is not None and scene.character.body.shapes:
             self._surface = cKDTree(scene.character.canonical(scene.character.body.points))
@@ -132,7 +143,7 @@ class RolloutMaker:
 
         scene = self.scene
         draw = self.draw(index)
-        joints = draw.clip.at(draw.times)
+        joints = draw.joints(scene.character)
         groom = scene.grooms[draw.groom]
         rest = self.fitted(groom.rest[draw.strands].astype(np.float64), draw.shape)
         shape = draw.shape
@@ -212,8 +223,7 @@ class RolloutMaker:
 
         scene = self.scene
         span = (scene.frames - 1) * scene.spec.dt
-        captured = () if scene.held_out else scene.clips
-        clips = [clip for clip in captured if clip.end - clip.start > 0.6 * span]
+        clips = [clip for clip in self._captured if clip.end - clip.start > 0.6 * span]
         if clips and rng.random() < 0.35:
             source = clips[rng.integers(len(clips))]
             start = rng.uniform(source.start, max(source.start, source.end - span))

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rollouts cut from motion that a user gives: hair feels what the network reads of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from neuralocks_core.animation.random_motion import scripted_clip
+from neuralocks_core.metrics import motion_error
+from neuralocks_core.motion import Clip
+from neuralocks_core.smooth_motion import SmoothMotion
+from tests.core.rigs import person, straight_hair
+
+pytest.importorskip("torch", reason="the extra 'train' is not installed")
+pytest.importorskip("warp", reason="the extra 'train' is not installed")
+from neuralocks_core.training.rollouts import PREROLL, RolloutMaker, TrainingScene
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
+
+
+def captured_of(scene, clip, count):
+    """The first rollouts that are cut from a clip."""
+    maker = RolloutMaker(replace(scene, clips=(clip,)))
+    wanted = [i for i in range(40) if maker.draw(i).first == PREROLL][:count]
+    assert len(wanted) == count
+    return [maker.make(i) for i in wanted]
+
+
+def test_no_rollout_reaches_across_a_cut_of_its_motion(scene):
+    walk = scripted_clip(scene.character, "walk", 8.0)
+    joints = walk.joints.copy()
+    joints[walk.times >= 4.0, :, 0, 3] += 3.0
+    length = np.linalg.norm(np.diff(scene.grooms[0].rest[0], axis=0), axis=-1).sum()
+    for rollout in captured_of(scene, replace(walk, joints=joints, cuts=[4.0]), 6):
+        steps = np.diff(rollout.moved[rollout.first :] * rollout.step, axis=0)
+        assert np.linalg.norm(steps, axis=-1).max() < 0.2 * length
+
+
+@pytest.mark.parametrize("rate, held", [(24, 1), (24, 2)])
+def test_hair_is_simulated_on_the_motion_that_the_network_reads(scene, rate, held):
+    """Between the samples of a file, and through poses that it holds, as in a bake."""
+    fine = scripted_clip(scene.character, "walk", 8.0, 120.0)
+    few = fine.times[:: 120 // rate]
+    given = Clip(few, fine.at(few[np.arange(len(few)) // held * held]))
+    smooth = Clip(fine.times, SmoothMotion(scene.character, Clip(few[::held], given.joints[::held])).at(fine.times))
+    for rollout, true in zip(captured_of(scene, given, 2), captured_of(scene, smooth, 2), strict=True):
+        moved, wanted = (each.moved[each.first :] * each.step for each in (rollout, true))
+        assert np.abs(rollout.vectors - true.vectors)[:, scene.spec.slices["pose"]].max() < 1e-3
+        lengths = np.linalg.norm(np.diff(true.rest, axis=1), axis=-1).sum(axis=1)
+        assert motion_error(moved, wanted, lengths)["median"] < 0.01
