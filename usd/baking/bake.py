@@ -100,7 +100,7 @@ def bake(
         *(note for note in known if note not in untrue),
         *model_notes(strand_model, look, shot, strength),
     ]
-    how = {"together": True, "velocities": velocities, "progress": progress}
+    how = {"together": True, "velocities": velocities, "blown": blown is not None, "progress": progress}
     return write_told(notes, tell, began, shot, out, codes, poser, inputs | options, facts, **how)
 
 

@@ -57,6 +57,7 @@ def write_samples(
     *,
     together: bool = False,
     velocities: bool = True,
+    blown: bool = False,
     progress: Progress | None = None,
 ) -> int:
     """Write an override layer.
@@ -70,6 +71,7 @@ def write_samples(
         facts: what the file records about how it was made, see `recorded`.
         together: pose the grooms of a head together, not each alone.
         velocities: write velocities.
+        blown: whether there is a wind.
         progress: called with (done, total, message).
 
     Returns:
@@ -85,7 +87,7 @@ def write_samples(
     batched = batches(shot.grooms) if together else [[item] for item in shot.grooms]
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
     try:
-        return _write(shot, codes, batched, poser, spool, facts, velocities, progress or silent)
+        return _write(shot, codes, batched, poser, spool, facts, velocities, blown, progress or silent)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt | CannotWrite) or stopped():
             spool.close()
@@ -103,8 +105,8 @@ def _carried(item: StageGroom) -> list:
     return [item.path, found.rig.path, joints, found.to_bind.tolist(), found.rig.clip.cuts.tolist()]
 
 
-def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, velocities: bool, say) -> int:
-    plans = [[Stencils(item, codes, shot.first, velocities) for item in items] for items in batched]
+def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, velocities, blown: bool, say) -> int:
+    plans = [[Stencils(item, codes, shot.first, velocities, blown) for item in items] for items in batched]
     uses = Uses(plans)
     there = spool.go_on(_plan(shot, spool.out, codes, facts), uses.spent)
     needed = [uses.codes(number) for number in range(len(plans))]

@@ -85,7 +85,8 @@ def simulate(
     facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
     facts |= wind_facts(blown) | given_facts(cuts, joints)
     notes = known_notes(shot, codes, loop, loop or cuts is None)
-    return write_told(notes, tell, began, shot, out, codes, poser, inputs, facts, progress=progress)
+    how = {"blown": blown is not None, "progress": progress}
+    return write_told(notes, tell, began, shot, out, codes, poser, inputs, facts, **how)
 
 
 class _SimulatedPoser:
@@ -99,13 +100,14 @@ class _SimulatedPoser:
         chosen = every.whole_locks(count)
         if not len(chosen):
             raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
-        codes, clip = Stencils(item, codes, first).codes, replace(self._rig.clip, loop=loop)
+        codes = Stencils(item, codes, first, blown=wind is not None).codes
+        clip = replace(self._rig.clip, loop=loop)
         seconds = self._rig.border.seconds(codes)
         # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest. A loop has no beginning, so
-        # its wanted frames come after a run-in.
-        wanted = clip.wrapped(seconds) if loop else np.maximum(seconds, clip.start)
-        # A wind has no beginning, either.
-        times = np.unique([clip.start - (RUN_IN if loop else BLOWN if wind else 0), *wanted])
+        # its wanted frames come after a run-in. A wind has none, either: hair moves in it before the animation.
+        begins = clip.start - (RUN_IN if loop else BLOWN if wind else 0)
+        wanted = clip.wrapped(seconds) if loop else np.maximum(seconds, begins)
+        times = np.unique([begins, *wanted])
         self._row = dict(zip(codes, np.searchsorted(times, wanted), strict=True))
         character = item.attachment.character
         self._skin = RootSkin(character, [every], clip)

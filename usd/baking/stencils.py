@@ -13,14 +13,15 @@ class Stencils:
 
     Central differences over one and two frames on both sides, accurate to fourth order: at 24 frames a second within 2 % for hair
     that swings three times a second. Where the animation begins and ends, and at a cut, where the character jumps, differences are
-    one-sided, to second order: before the first sample hair is at rest, after the last one the body stands still and hair swings
-    on. The velocity at a time code depends on that time code only, not on which others are baked.
+    one-sided, to second order: before the first sample hair is at rest, or only a wind moves it; after the last one the body stands
+    still and hair swings on. The velocity at a time code depends on that time code only, not on which others are baked.
 
     Args:
         item: the groom.
         codes: ascending time codes of the samples.
         origin: the shot's first time code, from which frames are counted.
         velocities: whether velocities are wanted at all.
+        blown: whether there is a wind.
 
     Attributes:
         wanted: time codes to write.
@@ -28,13 +29,16 @@ class Stencils:
         puts: in writing order, "points" or "velocities", the time code, and the time codes at which it needs points.
     """
 
-    def __init__(self, item: StageGroom, codes: list[float], origin: float, velocities: bool = True):
+    def __init__(
+        self, item: StageGroom, codes: list[float], origin: float, velocities: bool = True, blown: bool = False
+    ):
         self.wanted = dict.fromkeys(codes)
         clip, moving = item.attachment.rig.time_codes, item.placement.samples
         rig, border = item.attachment.rig, item.attachment.rig.border
         self._first, self._last = min([clip[0], *moving[:1]]), max([clip[-1], *moving[-1:]])
         after = np.searchsorted(rig.clip.times, rig.clip.cuts - 1e-9)
         self._before, self._after = clip[after - 1], clip[after]
+        self._blown = blown
         self._origin, self._step, self._rate = origin, border.frame, border.rate / border.frame
         # Neighbours that are samples themselves keep exactly the same number.
         self._known = np.array(codes, float)
@@ -52,6 +56,8 @@ class Stencils:
         last = self._before[part] if part < len(self._before) else self._last
         if code > self._last + slack:
             first, last = self._last, np.inf
+        elif self._blown and code < self._first - slack:
+            first, last = -np.inf, self._first
         room = (code - first) / step + slack, (last - code) / step + slack
         if min(room) >= 2:
             weights = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}

@@ -54,6 +54,24 @@ def test_a_frame_does_not_depend_on_the_others_and_parts_make_the_whole(tmp_path
         join([parts[0], calm], tmp_path / "mixed.usdc")
 
 
+@pytest.mark.parametrize("how", [bake, simulate])
+def test_gusts_move_hair_before_the_animation_and_its_velocities_say_so(tmp_path, how):
+    """In the frames before it, which a shot may render too, the body stands still and the wind goes on."""
+    if how is simulate:
+        pytest.importorskip("warp", reason="the extra 'compare' is not installed")
+    given = {"model": write_random_model(tmp_path / "lively.neuralocks", gain=8.0)} if how is bake else {"strands": 20}
+    wind = {"wind": (4, 0, -4), "gusts": 1}
+    done = how(write_shot(tmp_path), tmp_path / "early.usdc", frames="-12:0", **wind, **given).path
+    at = {code: samples(done, "points", at=code).astype(float) for code in range(-12, 1)}
+    central = (8 * (at[-4] - at[-6]) - (at[-3] - at[-7])) * 24 / 12
+    velocities = samples(done, "velocities", at=-5)
+    assert np.abs(central).max() > 1e-3
+    assert np.allclose(velocities, central, atol=1e-3 + 0.02 * np.abs(central).max())
+    later = how(write_shot(tmp_path), tmp_path / "later.usdc", frames="3:4", **wind, **given).path
+    both = how(write_shot(tmp_path), tmp_path / "both.usdc", frames="-2:4", **wind, **given).path
+    assert np.array_equal(samples(later, "velocities", at=4), samples(both, "velocities", at=4))
+
+
 def test_the_command_bakes_what_the_call_bakes(tmp_path, model, capsys):
     shot = write_shot(tmp_path)
     words = ["bake", shot, "-o", tmp_path / "told.usdc", "--model", model, "--wind", "-2,0,1.5", "--gusts", "0.3"]
