@@ -80,35 +80,38 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
     }
 
 
-def speed(points: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Speed (T - 1, S, K) [m/s] of every vertex between consecutive times (T,) [s]."""
-    far = np.empty((len(points) - 1, *points.shape[1:-1]), np.result_type(points, np.float32))
-    for frame in range(len(far)):  # all differences at once would be as large as all points
-        far[frame] = np.linalg.norm(points[frame + 1] - points[frame], axis=-1)
-    return far / np.diff(times)[:, None, None]
+def speed(points: np.ndarray, times: np.ndarray, cuts: np.ndarray = ()) -> np.ndarray:
+    """Speed (T - 1, S, K) [m/s] of every vertex between consecutive times (T,) [s]. Where hair starts anew, at times `cuts` (C,), its
+    jump is no motion: two times before and after one of them have no speed, and are left out.
+    """
+    kept = np.flatnonzero(np.diff(np.searchsorted(np.asarray(cuts, float) - 1e-9, times, side="right")) == 0)
+    far = np.empty((len(kept), *points.shape[1:-1]), np.result_type(points, np.float32))
+    for row, frame in enumerate(kept):  # all differences at once would be as large as all points
+        far[row] = np.linalg.norm(points[frame + 1] - points[frame], axis=-1)
+    return far / np.diff(times)[kept, None, None]
 
 
-def velocity_error(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
+def velocity_error(points: np.ndarray, reference: np.ndarray, times: np.ndarray, cuts: np.ndarray = ()) -> float:
     """Mean length of the velocity's error over the mean length of the reference's velocity; 1 for rigid hair. NaN if the reference
     is MOTIONLESS.
     """
-    return _relative(speed(np.asarray(points, float) - reference, times), speed(reference, times))
+    return _relative(speed(np.asarray(points, float) - reference, times, cuts), speed(reference, times, cuts))
 
 
-def motion_ratio(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> float:
+def motion_ratio(points: np.ndarray, reference: np.ndarray, times: np.ndarray, cuts: np.ndarray = ()) -> float:
     """Mean speed over the reference's mean speed: 0 for rigid hair, 1 for hair as lively as the reference, even if the motion is a
     different one. NaN if the reference is MOTIONLESS.
     """
-    return _relative(speed(points, times), speed(reference, times))
+    return _relative(speed(points, times, cuts), speed(reference, times, cuts))
 
 
-def dynamic_frames(points: np.ndarray, reference: np.ndarray, times: np.ndarray) -> int:
+def dynamic_frames(points: np.ndarray, reference: np.ndarray, times: np.ndarray, cuts: np.ndarray = ()) -> int:
     """Longest run of consecutive samples (a frame may have several) in which hair moves at 35 % of the reference's mean speed or
     more.
 
     Samples at which the reference stands still neither count nor break a run.
     """
-    own, true = speed(points, times).mean(axis=(1, 2)), speed(reference, times).mean(axis=(1, 2))
+    own, true = (speed(each, times, cuts).mean(axis=(1, 2)) for each in (points, reference))
     moving = true >= STILL
     best = run = 0
     for alive in own[moving] >= DYNAMIC_SHARE * true[moving]:
@@ -233,7 +236,7 @@ def _swing(points: np.ndarray) -> np.ndarray:
 
 def _relative(own: np.ndarray, true: np.ndarray) -> float:
     """Mean over mean of speeds [m/s]; NaN if the second mean is too small to divide by."""
-    return float(own.mean() / true.mean()) if true.mean() >= MOTIONLESS else float("nan")
+    return float(own.mean() / true.mean()) if _mean(true) >= MOTIONLESS else float("nan")
 
 
 def _mean(values) -> float:

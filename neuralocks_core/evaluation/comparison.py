@@ -34,13 +34,16 @@ TOGETHER = 32
 """Strands whose rollout is interpolated at a time."""
 
 
-def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times: np.ndarray) -> dict[str, float]:
+def compare(
+    answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times: np.ndarray, cuts: np.ndarray = ()
+) -> dict[str, float]:
     """All measures of an answer against the reference.
 
     Args:
         answer, reference: displacements from rest (T, S, 24, 3) [m], canonical.
         length: of the strands (S,) [m].
         times: (T,) [s].
+        cuts: times at which hair starts anew (C,) [s].
 
     Returns:
         Measures by the keys of `report.LABELS`, which has their units and remarks.
@@ -52,9 +55,9 @@ def compare(answer: np.ndarray, reference: np.ndarray, length: np.ndarray, times
         "motion_error_median": error["median"],
         "motion_error_p95": error["p95"],
         "motion_error_rms": error["rms"],
-        "velocity_error": metrics.velocity_error(answer, reference, times),
-        "motion_ratio": metrics.motion_ratio(answer, reference, times),
-        "dynamic_frames": metrics.dynamic_frames(answer, reference, times),
+        "velocity_error": metrics.velocity_error(answer, reference, times, cuts),
+        "motion_ratio": metrics.motion_ratio(answer, reference, times, cuts),
+        "dynamic_frames": metrics.dynamic_frames(answer, reference, times, cuts),
         "tip_correlation": _correlation(metrics.tip_curves(answer), metrics.tip_curves(reference)),
     }
 

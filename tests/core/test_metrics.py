@@ -46,6 +46,21 @@ def test_half_the_amplitude_is_half_the_motion():
     assert metrics.velocity_error(half, reference, TIMES) == pytest.approx(0.5)
 
 
+def test_the_jump_of_hair_that_starts_anew_is_no_motion():
+    """The same swing twice, with a cut in between, where one of the two hairs jumps by three metres."""
+    (reference, _), (half, _) = swinging(), swinging(amplitude=0.025)
+    twice = np.concatenate([TIMES, TIMES + 4])
+    jumping, steady = np.concatenate([half, half + 3]), np.concatenate([reference, reference])
+    assert len(metrics.speed(jumping, twice, [4.0])) == len(twice) - 2
+    for cut in (4.0, 3.99, TIMES[-1] + 1e-3):
+        assert metrics.motion_ratio(jumping, steady, twice, [cut]) == pytest.approx(0.5)
+        assert metrics.velocity_error(jumping, steady, twice, [cut]) == pytest.approx(0.5)
+    alone = metrics.dynamic_frames(reference, reference, TIMES)
+    assert metrics.dynamic_frames(steady, steady, twice, [4.0]) == 2 * alone
+    assert metrics.motion_ratio(jumping, steady, twice) > 0.6
+    assert np.isnan(metrics.motion_ratio(jumping[-2:], steady[-2:], twice[-2:], [twice[-1]]))
+
+
 def test_a_constant_droop_is_no_error_of_motion_but_one_of_position():
     reference, _ = swinging()
     lower = reference - [0, 0.02, 0]

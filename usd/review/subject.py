@@ -131,7 +131,8 @@ class Subject:
         if len(times) >= 3:
             tips = self.moved[:, :, -1] - self.moved[:, :, -1].mean(axis=0)
             swing = np.sqrt(np.square(tips).sum(axis=2).mean(axis=0)) / length
-            result["speed_cm_s"] = 100 * float(metrics.speed(self.moved, times).mean())
+            speed = metrics.speed(self.moved, times, self._cuts)
+            result["speed_cm_s"] = 100 * float(speed.mean()) if len(speed) else float("nan")
             result["swing_percent"] = 100 * float(swing.mean())
             result |= self._stops(joints)
         result["turn_degrees"] = metrics.turning(strands.rest + self.moved[:: max(1, len(times) // COLLISION_FRAMES)])
@@ -209,7 +210,8 @@ class Subject:
         true = comparison.simulated(self.character, some, clip, known, material, **felt, progress=self.say)[1:]
         answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
         answers["rigid"] = np.zeros_like(true)
-        rows = {who: comparison.compare(a, true, some.length, times) for who, a in answers.items() if a is not None}
+        measured = (true, some.length, times, self._cuts)
+        rows = {who: comparison.compare(a, *measured) for who, a in answers.items() if a is not None}
         tips = {who: metrics.tip_curves(a) for who, a in answers.items() if a is not None}
         return rows, tips | {"reference": metrics.tip_curves(true)}
 
@@ -233,6 +235,11 @@ class Subject:
     def _clip(self) -> Clip:
         """The motion; a loop if the bake records that it was one."""
         return replace(self.item.attachment.rig.clip, loop=bool(recorded(self.item.prim).get("loop")))
+
+    @property
+    def _cuts(self) -> np.ndarray:
+        """When hair starts anew (C,) [s]."""
+        return np.array([part.start for part in self._clip.parts[1:]])
 
     @cached_property
     def _resolver(self) -> Resolver:

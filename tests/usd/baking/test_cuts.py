@@ -11,6 +11,7 @@ from usd.baking.bake import bake
 from usd.cli.app import app
 from usd.cli.options import cut_codes
 from usd.review.baked import read_baked
+from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.shot.recorded import recorded
 
@@ -160,6 +161,17 @@ def test_the_reference_starts_anew_too(bakes):
     for name in ("given", "late"):
         assert np.abs(moved[name][-length:] - moved["after"]).max() < 2e-3
     assert np.abs(moved["none"][-length:] - moved["after"]).max() > 0.02
+
+
+def test_the_report_card_counts_no_motion_across_a_cut(bakes, shots, tmp_path, model):
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    speeds = []
+    for first, last in ((1, CUT - 1), (CUT, LAST)):
+        part = bake(shots[0], tmp_path / f"{first}.usdc", model, frames=f"{first}:{last}").path
+        speeds += [evaluate(part).grooms["/Hero/Hair"]["speed_cm_s"]] * (last - first)
+    whole = evaluate(bakes["found"].path, reference=True)
+    assert whole.grooms["/Hero/Hair"]["speed_cm_s"] == pytest.approx(np.mean(speeds), rel=1e-4)
+    assert whole.compared["/Hero/Hair"]["bake"]["dynamic_frames"] <= LAST - 2
 
 
 def test_cuts_may_be_given_at_once_or_one_by_one():

@@ -58,7 +58,7 @@ def test_a_frame_does_not_depend_on_the_others_and_parts_make_the_whole(tmp_path
 def test_gusts_move_hair_before_the_animation_and_its_velocities_say_so(tmp_path, how):
     """In the frames before it, which a shot may render too, the body stands still and the wind goes on."""
     if how is simulate:
-        pytest.importorskip("warp", reason="the extra 'compare' is not installed")
+        pytest.importorskip("warp", reason="the extra 'train' is not installed")
     given = {"model": write_random_model(tmp_path / "lively.neuralocks", gain=8.0)} if how is bake else {"strands": 20}
     wind = {"wind": (4, 0, -4), "gusts": 1}
     done = how(write_shot(tmp_path), tmp_path / "early.usdc", frames="-12:0", **wind, **given).path
