@@ -75,8 +75,11 @@ class JointSource:
         not motion: if they begin before it, the character would stand there, and hair would start with a blow.
         """
         channels = [(self.placement.samples, self.placement.at)]
-        if self._columns is not None:
-            every = self._channels() + (self._animation.GetBlendShapeWeightsAttr(),)
+        if self._animation is not None:
+            every = (
+                *(self._channels() if self._columns is not None else ()),
+                self._animation.GetBlendShapeWeightsAttr(),
+            )
             channels += [(attribute.GetTimeSamples(), attribute.Get) for attribute in every]
         moving, still = set(), set()
         for times, at in channels:
@@ -88,8 +91,8 @@ class JointSource:
 
     @property
     def animated(self) -> bool:
-        """Whether a SkelAnimation, or a parent's transform, drives it."""
-        return self._columns is not None or bool(self.placement.samples)
+        """Whether a SkelAnimation, of joints or of a face alone, or a parent's transform drives it."""
+        return self._columns is not None or bool(self.samples)
 
     @property
     def moves_joints(self) -> bool:
@@ -207,6 +210,8 @@ class JointSource:
         if self._animation is None:
             return None
         listed = _names(self._animation.GetJointsAttr())
+        if not listed and self._of_a_face:
+            return None
         order = {name: i for i, name in enumerate(listed)}
         pairs = [(joint, order[name]) for joint, name in enumerate(self.names) if name in order]
         why = self._unusable_channel()
@@ -219,6 +224,12 @@ class JointSource:
             raise NeuralocksError(f"{self.animation.GetPath()}: joint '{double}' is listed twice; list each once")
         self._width = len(listed)
         return pairs
+
+    @property
+    def _of_a_face(self) -> bool:
+        """Whether the animation moves blend shapes and is not meant to move joints; UsdSkel applies it."""
+        weights, channels = self._animation.GetBlendShapeWeightsAttr(), self._channels()
+        return weights.HasAuthoredValue() and not any(channel.HasAuthoredValue() for channel in channels)
 
     def _ignore(self, why: str) -> None:
         self.ignored = why

@@ -9,6 +9,7 @@ from tests.strand_models import write_random_model
 from usd.baking.bake import bake
 from usd.baking.simulate import simulate
 from usd.review.evaluate import evaluate
+from usd.review.inspect import inspect
 
 from ..shots import CENTRE, Recipe, samples, strand_points, world_points, write_shot
 
@@ -53,6 +54,21 @@ def test_hair_rides_on_a_face_that_moves(tmp_path, still_model, resolve):
         near = 5e-4 if resolve else 2e-6  # moving skin is measured more roughly than still skin
         np.testing.assert_allclose(with_it - without, np.broadcast_to(expected, rest.shape), atol=near)
     np.testing.assert_array_equal(samples(moving.path, "points", at=1), samples(still.path, "points", at=1))
+
+
+def test_a_face_alone_may_be_animated(tmp_path, still_model):
+    """UsdSkel applies the blend shapes of an animation that has no joints at all."""
+    way = np.array([0.002, -0.012, 0.005])
+    shot = face(tmp_path, {1: 0.0, LAST: 1.0}, way)
+    stage = Usd.Stage.Open(str(shot))
+    for name in ("joints", "translations", "rotations", "scales"):
+        stage.GetPrimAtPath("/Hero/Rig/Motion").RemoveProperty(name)
+    stage.Save()
+    out = bake(shot, tmp_path / "out.usdc", still_model, resolve=False)
+    assert not any("ignores" in note for note in out.notes)
+    moved = world_points(out.path, LAST) - world_points(out.path, 1)
+    np.testing.assert_allclose(moved, np.broadcast_to(way[[0, 2, 1]] * [1, 1, -1], moved.shape), atol=2e-6)
+    assert inspect(shot)["stops"] == []
 
 
 def test_hair_rides_on_skin_between_samples_as_usd_skel_moves_it(tmp_path, still_model):
