@@ -32,6 +32,8 @@ FOLLOW = 0.04
 """[m] How far from the body hair still follows a change of its shape."""
 PREROLL = 30
 """Frames at the start of a cut from motion capture that are simulated but not learned from: the hair was not at rest there."""
+LEAST = 0.6
+"""Shorter motion, relative to a rollout, is not cut from: the body would stand still for most of what is learned."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,15 @@ class TrainingScene:
     frames: int = 110
     strands: int = 64
     held_out: bool = False
+
+    @property
+    def span(self) -> float:
+        """Length of a rollout [s]."""
+        return (self.frames - 1) * self.spec.dt
+
+    def usable(self, clip: Clip) -> list[Clip]:
+        """The parts of given motion between its cuts that are long enough to cut rollouts from."""
+        return [part for part in clip.parts if part.end - part.start > LEAST * self.span]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +142,7 @@ class RolloutMaker:
         self.body = hair_body(scene.character, reach=0.2 - float(lowest))
         self._usable = [held_out_split(groom, scene.held_out) for groom in scene.grooms]
         read = joints_read(scene.character)
-        captured = [Stepped.of(part, read).clip for clip in scene.clips for part in clip.parts]
+        captured = [Stepped.of(part, read).clip for clip in scene.clips for part in scene.usable(clip)]
         self._captured = [] if scene.held_out else captured
         self._surface = None
         if scene.character.body is not None and scene.character.body.shapes:
@@ -221,9 +232,7 @@ class RolloutMaker:
     def _motion(self, rng, shape) -> tuple[Clip, np.ndarray, int]:
         from neuralocks_core.animation.random_motion import random_clip
 
-        scene = self.scene
-        span = (scene.frames - 1) * scene.spec.dt
-        clips = [clip for clip in self._captured if clip.end - clip.start > 0.6 * span]
+        scene, clips, span = self.scene, self._captured, self.scene.span
         if clips and rng.random() < 0.35:
             source = clips[rng.integers(len(clips))]
             start = rng.uniform(source.start, max(source.start, source.end - span))

@@ -13,7 +13,7 @@ from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
-from neuralocks_core.training.rollouts import TrainingScene
+from neuralocks_core.training.rollouts import LEAST, TrainingScene
 
 from ..assets.grow import Barber
 from ..border.damage import names_damage
@@ -96,9 +96,15 @@ def training_scene(
         else:
             found += _file(source, rig, head, joints, notes)
     clips = tuple(read_clip(path, rig.character, notes) for path in motion)
+    scene = TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
+    notes += [
+        f"{path}: moves for less than {LEAST * scene.span:.1f} s at a time, too short to learn from; give longer motion"
+        for path, clip in zip(motion, clips, strict=True)
+        if not scene.usable(clip)
+    ]
     if tell:
         tell(list(dict.fromkeys(notes)))
-    return TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
+    return scene
 
 
 @names_damage

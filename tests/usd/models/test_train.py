@@ -65,6 +65,8 @@ def test_what_a_training_should_know_is_told_before_it(tmp_path):
     for notes in (told, grown):
         assert any("/Hero/Rig: the first of 2 skeletons is taken" in note for note in notes)
     assert any("no joint found for" in note for note in told)
+    short = f"{path}: moves for less than 2.2 s at a time, too short to learn from; give longer motion"
+    assert short in told and not scene.usable(scene.clips[0])
     assert len(scene.grooms[0].rest) == MOST_STRANDS and len(scene.clips) == 1
     alone = training_scene(path, str(path), str(path))
     assert len(alone.grooms) == 1 and len(alone.clips) == 1, "a name is one file, not one of each letter"
