@@ -12,7 +12,7 @@ from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
-from neuralocks_core.progress import Progress
+from neuralocks_core.progress import Progress, within
 from neuralocks_core.rotation import rotation_part
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.smooth_motion import SmoothMotion
@@ -99,11 +99,15 @@ def simulated(
         )
     parts = clip.parts
     part = np.searchsorted([p.start - 1e-9 for p in parts[1:]], times, side="right")
-    options = {"wind": wind, "volume": volume, "progress": progress}
-    result = np.empty((len(times), *strands.rest.shape), np.float32)
-    for i in np.unique(part):
+    # Times after a part's end are simulated apart: those before it must not depend on whether later ones are wanted.
+    run = 2 * part + (False if clip.loop else times > np.array([p.end for p in parts])[part] + 1e-9)
+    options = {"wind": wind, "volume": volume}
+    result, runs = np.empty((len(times), *strands.rest.shape), np.float32), np.unique(run)
+    for number, each in enumerate(runs):
+        i, rows = each // 2, run == each
         start = times[0] if i == part[0] else parts[i].start
-        result[part == i] = _from(start, character, strands, parts[i], times[part == i], material, **options)
+        say = within(progress, 1000 * number // len(runs), 1000 * (number + 1) // len(runs)) if progress else None
+        result[rows] = _from(start, character, strands, parts[i], times[rows], material, **options, progress=say)
     return result
 
 
@@ -137,8 +141,8 @@ def _from(start: float, character, strands, clip, times, material, wind: Wind | 
 
 
 def _without_stop(character: Character, clip: Clip, clock: np.ndarray, last: float) -> np.ndarray:
-    """World joint transforms (C, J, 4, 4) at times `clock` (C,) [s]. If only times within the clip are wanted, steps past its end
-    continue with its last velocity, so that hair does not feel a stop that was not asked for.
+    """World joint transforms (C, J, 4, 4) at times `clock` (C,) [s]. If times within the clip are wanted, steps past its end continue
+    with its last velocity: between steps, hair would feel a stop before it comes.
     """
     motion = SmoothMotion(character, clip)
     joints = motion.at(clock)

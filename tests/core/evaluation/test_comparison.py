@@ -121,7 +121,11 @@ def test_a_shot_that_ends_in_motion_is_felt_to_go_on():
     character, times = person(HEAD.vertices + CENTRE, {}), np.arange(24) / 24
     joints = np.tile(rigs.bind(), (24, 1, 1, 1))
     joints[:, :, 0, 3] += times[:, None]
-    found = simulated(character, lying_strands(character), Clip(times, joints, cuts=times[[12]]), times)
+    clip = Clip(times, joints, cuts=times[[12]])
+    found = simulated(character, lying_strands(character), clip, times)
     np.testing.assert_allclose(found, found[:1].repeat(24, axis=0), atol=1e-5)
+    between = simulated(character, lying_strands(character), clip, np.arange(72) / 72)
+    np.testing.assert_allclose(between[::3], found, atol=1e-5)
     handles = simulated(character, lying_strands(character), Clip(times, joints), np.arange(36) / 24)
+    np.testing.assert_allclose(handles[:24], found, atol=1e-5)
     assert np.abs(handles[24:] - handles[23]).max() > 1e-3, "and afterwards it stands"
