@@ -24,7 +24,8 @@ def model_notes(model: StrandModel, material: Material, shot: Shot, strength: fl
 
 def learned(model: StrandModel, shot: Shot) -> list[str]:
     """Those of a shot's notes that do not hold for a model: of characters whose measures it was trained on."""
-    found = [item.attachment for item in shot.grooms if not off_head(item.attachment)]
+    carriers = {item.attachment.character: item.attachment for item in shot.grooms}  # not each groom: they are measured
+    found = [each for each in carriers.values() if not off_head(each)]
     known = [each for each in found if model.knows(each.character, each.rig.clip)]
     return [note for each in known for note in untrained(_with_head(each))]
 

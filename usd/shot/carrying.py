@@ -69,7 +69,15 @@ def joint_shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.
 
 
 def carried_by(rig: StageRig, joint: int) -> Character:
-    """The rig's character with the joint that carries a groom: its head, one below it, or one that takes its role."""
+    """The rig's character with the joint that carries a groom: its head, one below it, or one that takes its role. The same object
+    for all grooms of that joint.
+    """
+    if joint not in rig.carried:
+        rig.carried[joint] = _carried_by(rig, joint)
+    return rig.carried[joint]
+
+
+def _carried_by(rig: StageRig, joint: int) -> Character:
     head, skeleton = rig.character.humanoid.get("head"), rig.character.skeleton
     if head == joint:
         return rig.character

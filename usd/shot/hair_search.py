@@ -7,6 +7,7 @@ from functools import cached_property
 from pxr import Usd
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 
 from ..border.placement import Placement, Unplaced
@@ -60,6 +61,7 @@ class HairSearch:
         self._of_others: list[str] = []
         self._far_off: list[tuple[Usd.Prim, Placement, Attachment]] = []
         self._bound_off: list[tuple[str, str]] = []
+        self._of_characters: dict[Character, list[str]] = {}  # notes, made once for all grooms that one joint carries
         self.carriers: list[StageRig] = []
 
     def no_hair(self) -> list[str]:
@@ -145,9 +147,12 @@ class HairSearch:
         # Only a note on the joint itself counts; a blend shape may have its name.
         if away and not any(found.how in note or f"joint '{joint}'" in note for note in self._notes[told:]):
             self._off_head.append(f"{path}: rides on '{joint}', not on a head")
-        measured = [] if away else untrained(carrying)  # a chest does not have a head's measures
-        self._notes += moved_as_open(prim) + undrawn(prim) + left_as_they_are(prim) + measured
-        self._notes += unevenly_scaled(carrying) + coarsely_placed(prim, found.rig, found.character, placement)
+        if found.character not in self._of_characters:
+            measured = [] if away else untrained(carrying)  # a chest does not have a head's measures
+            self._of_characters[found.character] = measured + unevenly_scaled(carrying)
+        self._notes += moved_as_open(prim) + undrawn(prim) + left_as_they_are(prim)
+        self._notes += self._of_characters[found.character]
+        self._notes += coarsely_placed(prim, found.rig, found.character, placement)
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found

@@ -146,14 +146,15 @@ def read_shot(
         if not still:
             _check_animated([rig])
         body, left = whole_body(rig, every)
-        found = [_on(body, item) if item.attachment.rig is rig else item for item in found]
+        found = _on(body, rig, found)
         notes += rig.notes + lies_down(rig) + partial_body(rig, left)
     notes += without_body(used, every)
-    for item in found:
-        carrying = replace(item.attachment.rig, character=item.attachment.character)
+    # Once for all grooms that one joint carries: each reads the whole motion.
+    for attachment in {item.attachment.character: item.attachment for item in found}.values():
+        carrying = replace(attachment.rig, character=attachment.character)
         if stops := without_turn(carrying):
             raise NeuralocksError(stops[0])
-        notes += rig_notes(item.attachment.rig if off_head(item.attachment) else carrying)
+        notes += rig_notes(attachment.rig if off_head(attachment) else carrying)
     first, last = frame_range(stage, used)
     return Shot(
         path=path,
@@ -236,12 +237,18 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
     return found
 
 
-def _on(body: Body | None, item: StageGroom) -> StageGroom:
-    """A groom on a character with this body."""
-    if body is item.attachment.character.body:
-        return item
-    character = replace(item.attachment.character, body=body)
-    return replace(item, attachment=replace(item.attachment, character=character))
+def _on(body: Body | None, rig: StageRig, grooms: list[StageGroom]) -> list[StageGroom]:
+    """The grooms, those of a rig on its characters with this body; grooms that share a character still do."""
+    if body is rig.character.body:
+        return grooms
+    own = {item.attachment.character for item in grooms if item.attachment.rig is rig}
+    on_body = {character: replace(character, body=body) for character in own}
+    return [
+        replace(item, attachment=replace(item.attachment, character=on_body[item.attachment.character]))
+        if item.attachment.character in own
+        else item
+        for item in grooms
+    ]
 
 
 def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:

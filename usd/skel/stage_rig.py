@@ -142,6 +142,13 @@ class StageRig:
         return ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
 
     @cached_property
+    def carried(self) -> dict[int, Character]:
+        """By joint, the character with that joint as what carries hair, made by `carrying.carried_by`: all grooms of a joint share
+        one, and with it what takes long to find on a dense body.
+        """
+        return {}
+
+    @cached_property
     def skins(self) -> list[Skin]:
         """Each mesh in bind world [m], by nearness."""
         return [Skin(*mesh.in_bind(self.to_bind)) for mesh in self.meshes]

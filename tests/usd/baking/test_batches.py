@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Grooms of one head are posed together, and each comes out as if it were alone."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom, UsdSkel, Vt
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 import usd.baking.batches as batches
+import usd.shot.hair_search as hair_search
+import usd.shot.stage as stage_reading
 from usd.baking.bake import bake
 from usd.shot.stage import read_shot
 
@@ -50,6 +54,27 @@ def test_those_of_one_head_that_follow_each_other_are_together(shot, monkeypatch
     assert names() == [["A", "B", "C"], ["e"]]
     monkeypatch.setattr(batches, "TOGETHER", 20)
     assert names() == [["A", "B"], ["C"], ["e"]]
+
+
+@pytest.mark.parametrize("skeletons", [1, 2])
+def test_a_character_is_looked_at_once_for_all_that_one_joint_carries(shot, monkeypatch, skeletons):
+    if skeletons == 2:  # clothes, which become part of the body
+        stage = Usd.Stage.Open(str(shot))
+        layer = stage.GetRootLayer()
+        for name in ("Rig", "Skin"):
+            Sdf.CopySpec(layer, f"/Hero/{name}", layer, f"/Hero/Clothes{name}")
+        UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/ClothesSkin")).GetSkeletonRel().SetTargets(["/Hero/ClothesRig"])
+        stage.Save()
+    looks = {}
+    for name in ("without_turn", "rig_notes", "untrained", "unevenly_scaled"):
+        module = stage_reading if hasattr(stage_reading, name) else hair_search
+        looks[name] = Mock(wraps=getattr(module, name))
+        monkeypatch.setattr(module, name, looks[name])
+    items = read_shot(shot).grooms
+    assert [item.path[-1] for item in items] == ["A", "B", "C", "e"]
+    assert len({item.attachment.character for item in items}) == 2
+    seen = {name: [call.args[0].character.carrying_joint for call in look.mock_calls] for name, look in looks.items()}
+    assert seen == {"without_turn": [3, 2], "rig_notes": [3, 3], "untrained": [3], "unevenly_scaled": [3, 2]}
 
 
 @pytest.mark.parametrize("resolve", [True, False])
