@@ -3,7 +3,6 @@
 
 import numpy as np
 from pxr import Usd
-from scipy.spatial import cKDTree
 
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.root_skin import ASTRAY
@@ -72,17 +71,17 @@ def _turned_round(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> float:
     body, head = rig.character.body, rig.character.humanoid.get("head")
     if rig.surface is None:  # no more can be said than how far its points are
         return 0.0
-    vertices = cKDTree(body.points)
-    on_head = np.zeros(len(body.points))
-    if head is not None:
-        on_head = (body.joint_weights * rig.character.of_head[body.joint_indices]).sum(axis=1)
+
+    def on_head(points: np.ndarray) -> float:
+        below = rig.vertices.query(points)[1]
+        return float((body.joint_weights[below] * rig.character.of_head[body.joint_indices[below]]).sum(axis=1).mean())
 
     def told(last: bool) -> tuple[float, float]:
         """Distance [m] and share on the head; roots that begin inside of skin are on it."""
         ends = [transformed(points, to_bind) for points in either_ends(prim, last=last)]
         far = [rig.surface.distance(points)[0] for points in ends]
         middle = min(float(np.median(abs(each) if last else each.clip(0))) for each in far)
-        return middle, float(on_head[vertices.query(ends[-1])[1]].mean())
+        return middle, 0.0 if head is None else on_head(ends[-1])
 
     (first, first_on_head), (last, last_on_head) = told(last=False), told(last=True)
     gained = last_on_head - first_on_head

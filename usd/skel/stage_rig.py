@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from neuralocks_core.animation.cuts import APART, find_cuts, find_flashes
 from neuralocks_core.body.collider import Collider
@@ -161,6 +162,11 @@ class StageRig:
             return None if body is None else Collider(body.points, body.triangles)
         except NeuralocksError:  # a mesh without faces
             return None
+
+    @cached_property
+    def vertices(self) -> cKDTree:
+        """The body's vertices in bind pose."""
+        return cKDTree(self.character.body.points)
 
     @cached_property
     def motion_sketch(self) -> str:
