@@ -2,8 +2,7 @@
 """Signed distance to the head, which does not move relative to the hair: a grid, built once. Its hollows count as inside."""
 
 import hashlib
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +18,10 @@ EXACT = 0.01
 """Nodes farther than this from the surface [m] hold the distance to the nearest surface sample."""
 MOST_NODES = 1_000_000
 """At most: a head several times life size gets larger cells, since its features are larger. Bakes wait for the grid."""
+KEPT = 128 << 20
+"""Bytes of fields that are kept: one head has a field for each radius within which some of its hair reaches the body, and a crowd
+asks for those of each character in turn.
+"""
 SAME = 7
 """Decimal places [m] to which points are rounded, to tell heads apart and to build the grid."""
 
@@ -29,20 +32,16 @@ def head_field(points: np.ndarray, triangles: np.ndarray, still: np.ndarray) -> 
     digest = hashlib.sha256()
     for array in (points, triangles, still):
         digest.update(np.ascontiguousarray(array).tobytes())
-    return _made(_Mesh(digest.digest(), (points, triangles, still)))
+    key = digest.digest()
+    field = _kept.pop(key, None) or HeadField(points, triangles, still)
+    _kept[key] = field  # behind the others: the first one is the one that was not asked for the longest
+    while len(_kept) > 1 and sum(each.size for each in tuple(_kept.values())) > KEPT:
+        _kept.pop(next(iter(_kept)), None)
+    return field
 
 
-@dataclass(frozen=True)
-class _Mesh:
-    """Arrays that are identified by their digest."""
-
-    digest: bytes
-    arrays: tuple = field(compare=False, repr=False)
-
-
-@lru_cache(maxsize=4)
-def _made(mesh: _Mesh) -> "HeadField":
-    return HeadField(*mesh.arrays)
+_kept: dict[bytes, "HeadField"] = {}
+"""Fields by the digest of their mesh."""
 
 
 class HeadField:
@@ -77,6 +76,11 @@ class HeadField:
         value = filled(value.reshape(size), self.cell).ravel()
         # Nodes nearest to something that moves are unknown, and so is all that is interpolated from them.
         self.values = np.where(fixed[nearest], value, np.inf).astype(np.float32).reshape(size)
+
+    @property
+    def size(self) -> int:
+        """Bytes of its arrays."""
+        return self.values.nbytes + self.moving.nbytes
 
     def near(self, reach: float) -> np.ndarray:
         """Nodes (N, 3) [m] that are inside, or less than `reach` outside."""
