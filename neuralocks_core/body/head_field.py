@@ -28,7 +28,7 @@ SAME = 7
 
 def head_field(points: np.ndarray, triangles: np.ndarray, still: np.ndarray) -> "HeadField":
     """The HeadField of a mesh, built once for all grooms of a head, for copies of it placed elsewhere, and for later bakes."""
-    points = np.round(points, SAME)  # a copy that is turned differs by rounding
+    points = np.round(points, SAME) + 0.0  # a copy that is turned differs by rounding, which also leaves negative zeros
     digest = hashlib.sha256()
     for array in (points, triangles, still):
         digest.update(np.ascontiguousarray(array).tobytes())

@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 import neuralocks_core.body.head_field as head_fields
+from neuralocks_core import rotation
 from neuralocks_core.body.head_field import ROOM, head_field
 
 
@@ -59,3 +60,11 @@ def test_fields_that_were_not_asked_for_the_longest_make_room(ball, monkeypatch)
     head_field(ball.vertices, ball.faces, high)
     assert head_field(ball.vertices, ball.faces, low) is kept
     assert head_field(ball.vertices, ball.faces, middle) is not dropped
+
+
+def test_a_copy_that_stands_turned_elsewhere_shares_its_field(ball):
+    still = ball.vertices[:, 2] > -0.05
+    turn, place = rotation.from_vector([0, 0.6, 0]), [3, 0, 2]
+    copy = (ball.vertices @ turn.T + place - place) @ turn
+    assert (copy != ball.vertices).any()
+    assert head_field(copy, ball.faces, still) is head_field(ball.vertices, ball.faces, still)
