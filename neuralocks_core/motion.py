@@ -105,8 +105,10 @@ class Clip:
         times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
         low, fraction = self._bracket(times)
         result, between = self.joints[low], fraction >= 1e-9
-        low = low[between]
-        result[between] = _blend(self.joints[low], self.joints[low + 1], fraction[between])
+        # Blending nothing takes as long as blending a pose, and in a crowd, each clip is asked for its ends by all others.
+        if between.any():
+            low = low[between]
+            result[between] = _blend(self.joints[low], self.joints[low + 1], fraction[between])
         return result
 
     def shape_at(self, times) -> np.ndarray:

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Clips hold samples exactly, blend between them, and refuse what is broken."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
-from neuralocks_core import rotation
+from neuralocks_core import motion, rotation
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from tests.core.rigs import HEAD, bind, moved
@@ -21,6 +23,17 @@ def test_samples_come_back_bit_for_bit_and_halfway_is_halfway():
     assert rotation.to_vector(half[:3, :3])[1] == pytest.approx(0.2)
     assert np.array_equal(clip.at([-5.0])[0], clip.joints[0])
     assert np.array_equal(clip.at([9.0])[0], clip.joints[-1])
+
+
+def test_samples_are_not_blended(monkeypatch):
+    """Reading a crowd asks each clip for its ends, once for each other character."""
+    blends = Mock(wraps=motion._blend)
+    monkeypatch.setattr(motion, "_blend", blends)
+    clip = moved([0.0, 0.1, 0.3], lambda t: np.stack([t, 0 * t, 0 * t], axis=-1))
+    assert np.array_equal(clip.at([0.0, 0.3, 9.0]), clip.joints[[0, 2, 2]])
+    assert not blends.called
+    clip.at([0.0, 0.2])
+    assert blends.called
 
 
 def test_a_loop_goes_on():
