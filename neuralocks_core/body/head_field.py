@@ -3,6 +3,7 @@
 
 import hashlib
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 
@@ -33,15 +34,21 @@ def head_field(points: np.ndarray, triangles: np.ndarray, still: np.ndarray) -> 
     for array in (points, triangles, still):
         digest.update(np.ascontiguousarray(array).tobytes())
     key = digest.digest()
-    field = _kept.pop(key, None) or HeadField(points, triangles, still)
-    _kept[key] = field  # behind the others: the first one is the one that was not asked for the longest
-    while len(_kept) > 1 and sum(each.size for each in tuple(_kept.values())) > KEPT:
-        _kept.pop(next(iter(_kept)), None)
+    with _keeping:
+        field = _kept.get(key)
+    field = field or HeadField(points, triangles, still)
+    with _keeping:
+        _kept.pop(key, None)
+        _kept[key] = field  # behind the others: the first one is the one that was not asked for the longest
+        while len(_kept) > 1 and sum(each.size for each in _kept.values()) > KEPT:
+            del _kept[next(iter(_kept))]
     return field
 
 
 _kept: dict[bytes, "HeadField"] = {}
 """Fields by the digest of their mesh."""
+_keeping = Lock()
+"""Held while `_kept` is read or changed: live hair is prepared in a thread of its own."""
 
 
 class HeadField:
