@@ -9,9 +9,9 @@ import signal
 import zipfile
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +38,8 @@ class RolloutFarm:
         self.folder.mkdir(parents=True, exist_ok=True)
         context = multiprocessing.get_context("spawn")
         self._told, self._tell = context.Pipe(duplex=False)  # both ends kept: an end closes with its last owner
-        work = [(scene, self.folder, range(i, count, processes), self._tell) for i in range(processes)]
+        self._scene, self._lines = scene, [context.Pipe() for _ in range(processes)]
+        work = [(line, self.folder, range(i, count, processes), self._tell) for i, (_, line) in enumerate(self._lines)]
         self._processes = [context.Process(target=_work, args=each, daemon=True) for each in work]
 
     def __enter__(self) -> RolloutFarm:
@@ -46,10 +47,22 @@ class RolloutFarm:
             with _one_thread_each(), _without_interrupts():
                 for process in self._processes:
                     process.start()
+            self._hand_over()
         except BaseException:  # if one cannot start, the others are stopped
             self.__exit__()
             raise
         return self
+
+    def _hand_over(self) -> None:
+        """Give each process the scene once it asks. As an argument it would go into a pipe that is too small for it, and Python waits
+        for good, deaf to Ctrl-C, for a process that ends before it reads that.
+        """
+        for process, (line, theirs) in zip(self._processes, self._lines):
+            theirs.close()
+            if line in wait([line, process.sentinel]):
+                with suppress(EOFError, OSError):  # it ended; `failed` tells
+                    line.recv()
+                    line.send(self._scene)
 
     def __exit__(self, *_) -> None:
         for process in self._processes:
@@ -84,6 +97,19 @@ class RolloutFarm:
         else:
             why = "training: the solver's process ended early; fix what it reports above"
         return NeuralocksError(f"{why}, and go on with --resume")
+
+
+def check_guarded() -> None:
+    """Refuse to train while a process of a farm imports the script that trains.
+
+    Raises:
+        NeuralocksError: this is such a process.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # multiprocessing's own check reads it, too
+        raise NeuralocksError(
+            "training: its processes import the script that calls it, and would train again; "
+            'call it under if __name__ == "__main__":'
+        )
 
 
 @contextmanager
@@ -198,9 +224,14 @@ def _path(folder: Path, index: int) -> Path:
     return folder / f"{index:06d}.npz"
 
 
-def _work(scene: TrainingScene, folder: Path, indices: range, tell: Connection) -> None:
+def _work(line: Connection, folder: Path, indices: range, tell: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is only blocked until now, on Windows not even that
     parent = multiprocessing.parent_process()
+    try:
+        line.send(None)
+        scene = line.recv()
+    except (EOFError, OSError):  # the trainer has ended
+        return
     try:
         maker = RolloutMaker(scene)
         for index in indices:

@@ -23,7 +23,7 @@ from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.beginning import Beginning, kept_coder
 from neuralocks_core.training.export import strand_graphs
-from neuralocks_core.training.farm import RolloutFarm
+from neuralocks_core.training.farm import RolloutFarm, check_guarded
 from neuralocks_core.training.gauge import Gauge, measure
 from neuralocks_core.training.methods import method_of, wait
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
@@ -92,6 +92,7 @@ def train_strands(
         NeuralocksError: an option out of bounds, nothing to train on, a model or checkpoint that does not fit, or a
             failed solver process.
     """
+    check_guarded()
     options = options or RegressionOptions()
     check_options(options, rollouts, processes)
     out, work = Path(out), work_folder(out, resume)

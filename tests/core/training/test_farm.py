@@ -4,9 +4,11 @@
 import multiprocessing
 import os
 import signal
+import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -168,6 +170,33 @@ def test_a_process_that_fails_says_why_and_leaves_ctrl_c_to_the_trainer(tmp_path
         said = f"warp: is not installed; install it (deaf: {deaf}), and go on with --resume"
         assert str(workers.failure()) == said
     assert capfd.readouterr().err == ""
+
+
+UNGUARDED = """
+import sys, time
+from neuralocks_core.training.farm import RolloutFarm
+from neuralocks_core.training.train import train_strands
+
+if __name__ != "__main__":
+    train_strands(None, sys.argv[1] + "/hair.neuralocks")
+with RolloutFarm(bytes(1_000_000), sys.argv[1], 1) as workers:
+    while workers.alive:
+        time.sleep(0.01)
+    print(workers.failure())
+"""
+
+
+def test_a_script_without_a_guard_is_told_and_does_not_hang(tmp_path):
+    """Its processes import it, train again and end, before they have read a scene that is larger than a pipe."""
+    pytest.importorskip("torch", reason="the extra 'train' is not installed")
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED, "utf-8")
+    found = os.environ | {"PYTHONPATH": str(Path(farm.__file__).parents[2])}
+    done = subprocess.run(
+        [sys.executable, script, tmp_path], capture_output=True, text=True, env=found, timeout=100, check=True
+    )
+    assert 'call it under if __name__ == "__main__":' in done.stderr
+    assert "ended early; fix what it reports above" in done.stdout
 
 
 def test_ctrl_c_while_processes_start_is_heard_once_they_run(tmp_path, monkeypatch):
