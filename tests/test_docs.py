@@ -212,3 +212,17 @@ def test_examples_import_what_is_there(document):
             if isinstance(node, ast.ImportFrom):
                 module = (ROOT / node.module.replace(".", "/")).with_suffix(".py")
                 assert {each.name for each in node.names} <= defined(module), node.module
+
+
+def test_every_file_is_under_the_licence_that_the_credits_state():
+    """GPL-3.0-or-later is what runs in Blender; all else, but for empty files, is Apache-2.0."""
+    credits = (ROOT / "CREDITS.md").read_text("utf-8")
+    assert all(f"`{name}" in credits for name in ("LICENSE`", "dcc_addon/`", "dcc_addon/LICENSE`", "blender_*.py`"))
+    for path in (path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")):
+        folders = path.relative_to(ROOT).parts[:-1]
+        blender = "dcc_addon" in folders or folders[:2] in {("tests", "addon"), ("tests", "blender")}
+        if path.name.startswith("blender_") and folders[0] in ("examples", "benchmarks"):
+            blender = True
+        licence = "GPL-3.0-or-later" if blender else "Apache-2.0"
+        if text := path.read_text("utf-8"):
+            assert f"SPDX-License-Identifier: {licence}\n" in text[:100] and licence in credits, path
