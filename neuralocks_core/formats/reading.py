@@ -186,7 +186,9 @@ def _reader(path: Path, content: bytes):
         return counted.read_ct2hair
     if suffix == ".hair":
         raise bad_file(str(path), "does not begin with HAIR", "give a file in Cem Yuksel's format")
-    raise bad_file(str(path), "is not a known groom file, by content or by name", f"give {' '.join(EXTENSIONS)}")
+    raise bad_file(
+        str(path), "is not a known groom file, by content or by name", f"give {' '.join(EXTENSIONS)}, or USD curves"
+    )
 
 
 def _check_finite(points: np.ndarray, path: Path) -> None:

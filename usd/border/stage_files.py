@@ -63,7 +63,7 @@ def check_file(path: Path) -> None:
 def _remedy(path: Path) -> str:
     if path.suffix.lower() not in OTHERS:
         return "export it again"
-    by = " (examples/vrm_to_usd.py does)" if path.suffix.lower() in GLTF else ""
+    by = " (examples/vrm_to_usd.py in the source does)" if path.suffix.lower() in GLTF else ""
     first = "open it in Blender" if path.suffix.lower() == ".blend" else "import it into Blender"
     return f"{first} and export USD there{by}"
 

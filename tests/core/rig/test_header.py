@@ -167,6 +167,12 @@ int main(void) {
     assert "as they are named in its rig: head __ int y_ __, neck \\u9996\n" in header
 
 
+def test_what_an_engine_gets_states_its_licence(tmp_path):
+    export_c(random_model(), tmp_path / "hair.h")
+    for name in ("hair.h", "hair_example.c"):
+        assert (tmp_path / name).read_text().startswith("/* SPDX-License-Identifier: Apache-2.0 */\n")
+
+
 def test_a_long_list_of_chains_ends_after_a_whole_name(tmp_path):
     """And says that it goes on: nobody should look for a joint by half of a name."""
     model = random_model((1,) * 60)

@@ -149,7 +149,7 @@ def test_features_that_do_not_fit_are_refused(tmp_path):
     ("ending", "how"),
     [
         ("fbx", "import it into Blender and export USD there$"),
-        ("vrm", r"import it into Blender and export USD there .*vrm_to_usd.py does\)$"),
+        ("vrm", r"import it into Blender and export USD there .*vrm_to_usd.py in the source does\)$"),
         ("glb", "import it into Blender .*vrm_to_usd"),
         ("abc", "import it into Blender and export USD there$"),
         ("blend", "open it in Blender and export USD there$"),
