@@ -50,7 +50,7 @@ _STEPS = {
 _CLIP = (
     "the samples that a bake reads of a shot's motion: those of the skeleton's animation and of its parents' transforms. The "
     f"shot's range adds its end if that lies after the last of them, and its start if that lies {STAND:g} s or more before "
-    "the first: the character stands still in between. A start nearer than that adds nothing. Between two "
+    "the first: the character stands still in between. Between two "
     f"samples farther apart than {CLOSE:g} s, each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
     f"or, if these are fewer than {SLOWEST:g} or more than {FASTEST:g} a second and framesPerSecond differs, 1 / framesPerSecond "
     f"seconds, counted from the first sample. Of samples nearer to each other than {SAME:g} frames the last one counts, as does the later of the two sides of a "
@@ -69,7 +69,7 @@ _STRAND_PLACE = _PLACE + " (for hair carried by a joint below it: that of `canon
 
 _WIND = (
     "add the binned steps of T(R_head(t_k)) w(t_k) / 9.81 to those of f_k, with w(t) the acceleration of hair by the wind [m/s^2, "
-    "world]; motion strength does not scale them. In a bake, w = m + gusts (a m + b s), with m the wind that it was given, s a "
+    "world]; motion strength does not scale them. In a bake, w = m + gusts (a m + b s), with m its wind, s a "
     f"level vector {ACROSS:g} times as long as m, towards (m.z, 0, -m.x), or +X if m is vertical, "
     f"a and b the sums of c sin(2 pi f t + phase), c {_listed(SHARES)}, f {_listed(FREQUENCIES)} Hz, phases {_listed(PHASES[0])} and "
     f"{_listed(PHASES[1])} rad; in a loop, each f is rounded to whole turns in its length, one at least"
