@@ -12,7 +12,7 @@ from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
-from neuralocks_core.progress import Progress, within
+from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rotation import rotation_part
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.smooth_motion import SmoothMotion
@@ -106,7 +106,7 @@ def simulated(
     for number, each in enumerate(runs):
         i, rows = each // 2, run == each
         start = times[0] if i == part[0] else parts[i].start
-        say = within(progress, 1000 * number // len(runs), 1000 * (number + 1) // len(runs)) if progress else None
+        say = within(progress or silent, 1000 * number // len(runs), 1000 * (number + 1) // len(runs))
         result[rows] = _from(start, character, strands, parts[i], times[rows], material, **options, progress=say)
     return result
 

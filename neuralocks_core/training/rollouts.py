@@ -142,8 +142,8 @@ class RolloutMaker:
         self.body = hair_body(scene.character, reach=0.2 - float(lowest))
         self._usable = [held_out_split(groom, scene.held_out) for groom in scene.grooms]
         read = joints_read(scene.character)
-        captured = [Stepped.of(part, read).clip for clip in scene.clips for part in scene.usable(clip)]
-        self._captured = [] if scene.held_out else captured
+        clips = () if scene.held_out else scene.clips
+        self._captured = [Stepped.of(part, read).clip for clip in clips for part in scene.usable(clip)]
         self._surface = None
         if scene.character.body is not None and scene.character.body.shapes:
             self._surface = cKDTree(scene.character.canonical(scene.character.body.points))

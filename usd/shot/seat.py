@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pxr import Usd
 
+from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
@@ -128,15 +129,20 @@ def _on_faces(seat: Seat, roots: np.ndarray, when: float | None, placement: Plac
     """The seat by an unlikely way that puts roots right onto the skin, near which they only are by the likely one; None if there is
     none. A head that turns by a few degrees before the shot begins leaves hair near its skin, but moved along it by centimetres.
     """
-    rig = seat.rig
-    for place, to_bind in enumerate(ways(rig, seat.mesh, placement, when, likely=False, drifts=drifts)):
+    near = []
+    for place, to_bind in enumerate(ways(seat.rig, seat.mesh, placement, when, likely=False, drifts=drifts)):
         placed = transformed(roots, to_bind)
         middle = float(np.median(seat.skin.query(placed, seat.distance)[0]))
-        if np.isfinite(middle) and rig.surface is not None:
-            on, off = (float(np.median(np.abs(rig.surface.distance(each)[0]))) for each in (placed, seat.roots))
-            if off >= max(OFF_FACES, SURELY * on):
-                return replace(seat, distance=middle, to_bind=to_bind, way=(True, place), roots=placed)
-    return None
+        if np.isfinite(middle):
+            near.append(replace(seat, distance=middle, to_bind=to_bind, way=(True, place), roots=placed))
+    if not near or (surface := seat.rig.surface) is None or (off := _median_off(surface, seat.roots)) < OFF_FACES:
+        return None
+    return next((each for each in near if off >= SURELY * _median_off(surface, each.roots)), None)
+
+
+def _median_off(surface: Collider, points: np.ndarray) -> float:
+    """Median distance of points (n, 3) from faces, on either side [m]."""
+    return float(np.median(np.abs(surface.distance(points)[0])))
 
 
 def ways(

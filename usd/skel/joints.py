@@ -76,10 +76,8 @@ class JointSource:
         """
         channels = [(self.placement.samples, self.placement.at)]
         if self._animation is not None:
-            every = (
-                *(self._channels() if self._columns is not None else ()),
-                self._animation.GetBlendShapeWeightsAttr(),
-            )
+            posing = self._channels() if self._columns is not None else ()
+            every = (*posing, self._animation.GetBlendShapeWeightsAttr())
             channels += [(attribute.GetTimeSamples(), attribute.Get) for attribute in every]
         moving, still = set(), set()
         for times, at in channels:
