@@ -34,6 +34,13 @@ def scene():
     return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
 
 
+@pytest.fixture
+def few(monkeypatch):
+    """Trainings begin after four simulations, and are measured on two."""
+    monkeypatch.setattr(methods, "FIRST", 4)
+    monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
+
+
 def test_a_rollout_depends_on_its_number_alone(scene, tmp_path):
     one, two = RolloutMaker(scene).make(3), RolloutMaker(scene).make(3)
     save(tmp_path / "r.npz", two)
@@ -115,10 +122,8 @@ def test_held_out_motion_is_never_trained_on(scene):
     assert lengths & set(map(float, taken[0])) and not lengths & set(map(float, taken[1]))
 
 
-def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(scene, tmp_path, monkeypatch):
+def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(scene, few, tmp_path, monkeypatch):
     """With a budget in seconds, each step learns from what happens to be there."""
-    monkeypatch.setattr(methods, "FIRST", 4)
-    monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
     graphs = []
     for name, ready in (("early", 10), ("late", 0)):
         out = tmp_path / f"{name}.neuralocks"
@@ -154,7 +159,7 @@ def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
     assert np.ptp(tips, axis=0).max() > 0.03
 
 
-def test_a_killed_run_goes_on(scene, tmp_path, monkeypatch):
+def test_a_killed_run_goes_on(scene, few, tmp_path, monkeypatch):
     """Killed while the first simulations are made, and again after the first checkpoint."""
     out = tmp_path / "hair.neuralocks"
     work = tmp_path / "hair.neuralocks.training"
@@ -174,13 +179,13 @@ def test_a_killed_run_goes_on(scene, tmp_path, monkeypatch):
     wait = methods.wait
     with monkeypatch.context() as first, pytest.raises(KeyboardInterrupt):
         first.setattr(methods, "wait", kill_early)
-        train_strands(scene, out, short, rollouts=30)
+        train_strands(scene, out, short, rollouts=8)
     made = kept()
     assert not out.exists() and not (work / "checkpoint.npz").exists() and len(made) > 2
     with pytest.raises(KeyboardInterrupt):
-        train_strands(scene, out, short, rollouts=30, resume=True, progress=kill_late)
+        train_strands(scene, out, short, rollouts=8, resume=True, progress=kill_late)
     assert not out.exists() and (work / "checkpoint.npz").exists() and made.items() <= kept().items()
-    train_strands(scene, out, short, rollouts=30, resume=True)
+    train_strands(scene, out, short, rollouts=8, resume=True)
     assert model.read(out).meta["training"]["steps"] >= 40
 
 
@@ -200,10 +205,8 @@ def test_what_cannot_be_resumed_says_why(scene, tmp_path):
         checkpoint.load(path, {"net": torch.nn.Linear(2, 2)})
 
 
-def test_a_training_that_runs_away_is_one_line(scene, tmp_path, monkeypatch):
+def test_a_training_that_runs_away_is_one_line(scene, few, tmp_path):
     """Steps far too large end in NaN, or in weights that no model file holds: never in a model, nor in a checkpoint."""
-    monkeypatch.setattr(methods, "FIRST", 2)
-    monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
     out, options = tmp_path / "hair.neuralocks", RegressionOptions(steps=30, rate=1e12, clips=2, strands=2)
     with pytest.raises(NeuralocksError, match="--set rate") as caught:
         train_strands(scene, out, options, rollouts=2)
@@ -212,7 +215,7 @@ def test_a_training_that_runs_away_is_one_line(scene, tmp_path, monkeypatch):
         train_strands(scene, out, options, rollouts=2, resume=True)
 
 
-def test_a_training_is_resumed_as_it_was_begun_only(scene, tmp_path):
+def test_a_training_is_resumed_as_it_was_begun_only(scene, few, tmp_path):
     """Weights of another output or method fit in shape: hair would be wrong, or the optimiser would break. Simulations belong to
     the strands and the motion that they were made from; two trainings in one folder would mix theirs.
     """
