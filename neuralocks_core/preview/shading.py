@@ -12,6 +12,9 @@ CELL = 0.006
 """Width of a cell of the shadow map [m]."""
 MOST_CELLS = 120
 """Most cells along each side of the shadow map."""
+MOST_DEPTH = 3.0
+"""Greatest optical depth of a cell of the shadow map. In tied hair it would be many times as much, so that no light reached the
+middle of a cell that lies at the surface."""
 COVER = 2.2
 """Width of all strands side by side [m]: determines how much light is dimmed, for any number of drawn strands."""
 
@@ -167,6 +170,7 @@ class ShadowMap:
             low = low - np.float32(1.5) * cell
             index = np.ravel_multi_index(((seen - low[:, None]) / cell + np.float32(0.5)).astype(int), shape)
             grid = np.bincount(index, self.area / cell**2, int(np.prod(shape))).reshape(shape).astype(np.float32)
+            np.minimum(grid, np.float32(MOST_DEPTH), out=grid)
             for layer in range(len(grid) - 2, -1, -1):
                 grid[layer] += grid[layer + 1]
             self._columns[key] = axes, low, cell, grid

@@ -154,6 +154,16 @@ def test_hair_in_front_dims_what_is_behind_it():
     assert behind == pytest.approx(5, rel=0.25) and before < 0.05 and aside == 0
 
 
+def test_light_reaches_the_surface_of_tied_hair():
+    """As it reaches that of open hair: a braid was drawn black."""
+    rng, towards = np.random.default_rng(0), np.array([0, 0, 1.0])
+    around, down = rng.uniform(0, 2 * np.pi, 20000), rng.uniform(-0.3, 0, 20000)
+    far = 0.015 * np.sqrt(rng.uniform(0, 1, 20000))
+    braid = np.stack([far * np.cos(around), down, far * np.sin(around)], axis=1)
+    depth = shading.ShadowMap(braid, np.full(20000, 5e-5)).depth(braid, towards)
+    assert np.median(depth[braid[:, 2] > 0.012]) < 2 and np.median(depth[braid[:, 2] < 0]) > 3
+
+
 def never_drawn():
     return replace(scene(2, 20), hair=lambda frame: pytest.fail("the drawing was begun"))
 
