@@ -17,6 +17,10 @@ AZIMUTH, RAISED = 32.0, 0.085
 """Usual direction of the camera from the face to the character's left [degrees], and how far it looks down [rad]."""
 LOCK_TONE = 0.15
 """Standard deviation of the logarithm of how light a piece of mesh hair is."""
+FARTHEST = 0.6
+"""Hair farther from the middle of the head than this [m] need not be in the picture: faces would be small."""
+MARGIN = 1.06
+"""How many times as large as hair on top and at the sides of the head a picture is at least."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ class Film:
         self.scene, self.detail, self._calm = (scene := scene.life_size()), detail, calm
         self._pick(detail.strands)
         self._albedo = None if scene.body_rest is None else self._dress()
-        self._follow()
+        self._follow(width / height)
         triangles = np.zeros((0, 3), int) if scene.triangles is None else scene.triangles
         self._canvas = canvas(width, height, triangles, len(self._tone), detail)
 
@@ -197,25 +201,38 @@ class Film:
         tone = np.exp(np.random.default_rng(5).normal(0, LOCK_TONE, piece.max() + 1))[piece, None]
         return tone * ((1 - light) * np.array(scene.look.root) + light * np.array(scene.look.tip))
 
-    def _follow(self) -> None:
+    def _follow(self, shape: float) -> None:
         """Where cameras look, how far away they are, and where the face looks on average. Cameras go along with the head's
-        smoothed path but do not turn with it.
+        smoothed path but do not turn with it. `shape` is a picture's width by its height.
         """
         scene = self.scene
         centre = np.einsum("tij,j->ti", scene.head[:, :3, :3], scene.centre) + scene.head[:, :3, 3]
-        reach = np.linalg.norm(scene.rest - scene.centre, axis=1).max()
         step = np.median(np.diff(scene.times)) if len(scene.times) > 1 else 1.0
         smooth = _blurred(centre, self._calm / step)
         # How far the head strays from the smooth path, so that it stays in the picture during a jump.
         stray = np.abs(centre - smooth).max()
-        high = 0.15 + 0.60 * min(reach, 0.6) + 0.6 * min(stray, 0.3)
+        reach, aside, above = self._extent()
+        down = 0.36 * reach
+        high = max(0.15 + 0.60 * reach, MARGIN * (above + down), MARGIN * aside / shape) + 0.6 * min(stray, 0.3)
         front = scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1]
         front /= np.linalg.norm(front)
         # The average direction of the face, so that a shot in which the character turns does not show only its back.
         turned = np.einsum("tij,j->ti", scene.head[:, :3, :3], front).mean(axis=0) * [1, 0, 1]
         self._front = turned / np.linalg.norm(turned) if np.linalg.norm(turned) > 0.3 else front
-        self._aims = smooth - [0, 0.36 * min(reach, 0.6), 0]
+        self._aims = smooth - [0, down, 0]
         self._far = high / np.tan(np.radians(ANGLE) / 2)
+
+    def _extent(self) -> tuple[float, float, float]:
+        """How far hair reaches from the middle of the head, how far to any side, and how far above it hair or head reach [m]."""
+        scene = self.scene
+        hair = scene.rest - scene.centre
+        reach = np.linalg.norm(hair, axis=1).max()
+        aside, above = np.linalg.norm(hair[:, [0, 2]], axis=1).max(), hair[:, 1].max()
+        if scene.body_rest is not None:
+            body = scene.body_rest - scene.centre
+            over = body[np.linalg.norm(body[:, [0, 2]], axis=1) < min(reach, 0.1), 1]
+            above = max(above, over.max(initial=0))
+        return tuple(min(float(far), FARTHEST) for far in (reach, aside, above))
 
     def _camera(self, frame: int, azimuth: float) -> Camera:
         up, aim = np.array([0, 1.0, 0]), self._aims[frame]

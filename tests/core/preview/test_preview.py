@@ -12,6 +12,7 @@ pytest.importorskip("PIL", reason="the extra 'preview' is not installed")
 import trimesh
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.preview import camera as camera_module
 from neuralocks_core.preview import pictures as preview
 from neuralocks_core.preview import plain_canvas, shading
 from neuralocks_core.preview.canvas import open_canvas
@@ -162,6 +163,26 @@ def test_light_reaches_the_surface_of_tied_hair():
     braid = np.stack([far * np.cos(around), down, far * np.sin(around)], axis=1)
     depth = shading.ShadowMap(braid, np.full(20000, 5e-5)).depth(braid, towards)
     assert np.median(depth[braid[:, 2] > 0.012]) < 2 and np.median(depth[braid[:, 2] < 0]) > 3
+
+
+@pytest.mark.parametrize("size", [(44, 62), (30, 90), (96, 54)])
+@pytest.mark.parametrize("stretch", [[2, 3, 2], [2.9, 1, 1], [1, 2.9, 1]])
+def test_a_large_head_or_hairdo_is_in_the_picture_from_all_sides(size, stretch):
+    """It was cut off above and at the sides."""
+    person = scene()
+    large = (person.rest - CENTRE) * stretch + CENTRE
+    with closing(Film(replace(person, rest=large), *size, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
+        for azimuth in range(0, 360, 30):
+            camera = film._camera(0, azimuth)
+            right, up, back = ((large - camera.eye) @ camera.axes).T
+            highest = -back * np.tan(np.radians(camera_module.ANGLE) / 2)
+            assert (np.abs(up) < highest).all() and (np.abs(right) < highest * size[0] / size[1]).all()
+
+
+def test_the_picture_of_usual_hair_is_as_near_as_its_length_asks_for():
+    with closing(Film(scene(), 62, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
+        reach = np.linalg.norm(film.scene.rest - CENTRE, axis=1).max()
+        assert film._far * np.tan(np.radians(camera_module.ANGLE) / 2) == pytest.approx(0.15 + 0.6 * reach)
 
 
 def never_drawn():
