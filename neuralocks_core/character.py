@@ -156,6 +156,12 @@ class Character:
         """By how much `facing` turns about +Y [degrees], more than -180 and at most 180."""
         return float(np.degrees(np.arctan2(self.facing[0, 2], self.facing[0, 0])))
 
+    @property
+    def collar(self) -> tuple[float, float] | None:
+        """Heights of the left shoulder and of the neck in bind pose [m], lower first; None if joints do not tell."""
+        joints = self.humanoid.get("left_upper_arm"), self.humanoid.get("neck")
+        return None if None in joints else tuple(sorted(self.skeleton.bind[list(joints), 1, 3].tolist()))
+
     @cached_property
     def canonical_to_bind(self) -> np.ndarray:
         """Transform (4, 4) from canonical space (origin at the head joint, +Z face) to bind world."""

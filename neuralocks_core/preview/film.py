@@ -21,6 +21,8 @@ FARTHEST = 0.6
 """Hair farther from the middle of the head than this [m] need not be in the picture: faces would be small."""
 MARGIN = 1.06
 """How many times as large as hair on top and at the sides of the head a picture is at least."""
+COLLAR = 0.25
+"""How far below the middle of a grown-up's head clothes begin [m]."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class Scene:
         mesh_hair: vertices of the body that are hair (V,) bool, or None.
         look: colours.
         size: how many times a person's size the character is.
+        collar: heights in bind pose [m] between which clothes begin, lower first, such as shoulders and neck; None if unknown.
     """
 
     times: np.ndarray
@@ -73,6 +76,7 @@ class Scene:
     mesh_hair: np.ndarray | None = None
     look: shading.Look = field(default_factory=shading.Look)
     size: float = 1.0
+    collar: tuple[float, float] | None = None
 
     def life_size(self) -> "Scene":
         """The same with a giant shrunk to a person's size, at which cameras and light know what is near."""
@@ -89,6 +93,7 @@ class Scene:
             body=None if body is None else lambda frame: share * np.asarray(body(frame), float),
             body_rest=None if self.body_rest is None else share * self.body_rest,
             size=1.0,
+            collar=self.collar and (share * self.collar[0], share * self.collar[1]),
         )
 
 
@@ -184,7 +189,10 @@ class Film:
     def _dress(self) -> np.ndarray:
         """Skin above the collar, dark cloth below, and mesh hair: linear RGB (V, 3)."""
         scene = self.scene
-        below = (scene.centre[1] - scene.body_rest[:, 1] - 0.25) / 0.03
+        collar = scene.centre[1] - COLLAR
+        if scene.collar is not None:  # a child's head is nearer to its shoulders, a large one farther from its neck
+            collar = min(max(collar, scene.collar[0]), scene.collar[1])
+        below = (collar - scene.body_rest[:, 1]) / 0.03
         cloth = np.clip(below, 0, 1)[:, None]
         result = (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
         if scene.mesh_hair is not None:

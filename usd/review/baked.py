@@ -88,6 +88,7 @@ class Baked:
             body=None if body is None else pose,
             body_rest=None if body is None else body.points,
             size=character.times_human,
+            collar=character.collar,
         )
 
 

@@ -44,4 +44,5 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
         body_rest=body.points,
         mesh_hair=hair,
         size=character.times_human,
+        collar=character.collar,
     )

@@ -185,6 +185,18 @@ def test_the_picture_of_usual_hair_is_as_near_as_its_length_asks_for():
         assert film._far * np.tan(np.radians(camera_module.ANGLE) / 2) == pytest.approx(0.15 + 0.6 * reach)
 
 
+@pytest.mark.parametrize("size", [1, 32])
+@pytest.mark.parametrize("collar, begins", [(None, 1.25), ((1.2, 1.3), 1.25), ((1.33, 1.38), 1.33), ((1.1, 1.2), 1.2)])
+def test_clothes_begin_between_shoulders_and_neck(collar, begins, size):
+    """Children were drawn bare down to the navel."""
+    skin = CENTRE - np.linspace(0, 0.5, 500)[:, None] * [0, 1, 0]
+    who = replace(scene(), size=size, centre=size * CENTRE, body_rest=size * skin, triangles=np.zeros((0, 3), int))
+    who = replace(who, rest=size * who.rest, collar=collar and (size * collar[0], size * collar[1]))
+    with closing(Film(who, 44, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
+        bare = np.isclose(film._albedo, who.look.skin).all(axis=1)
+    assert skin[bare, 1].min() == pytest.approx(begins, abs=0.002) and not bare[-1]
+
+
 def never_drawn():
     return replace(scene(2, 20), hair=lambda frame: pytest.fail("the drawing was begun"))
 

@@ -11,6 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.cli.app import preview_command
 from usd.review import picture
+from usd.review.baked import read_baked
 
 from ..shots import Recipe, write_shot
 
@@ -85,3 +86,10 @@ def test_frames_that_the_bake_lacks_and_sizes_that_nobody_draws_are_refused(hair
 
 def test_the_commands_view_is_the_usual_one():
     assert inspect.signature(preview_command).parameters["view"].default == picture.AZIMUTH
+
+
+def test_clothes_begin_at_the_shoulders_that_the_skeleton_has(hair):
+    baked = read_baked(hair)
+    character = baked.shot.grooms[0].attachment.character
+    heights = character.skeleton.bind[[character.humanoid["left_upper_arm"], character.humanoid["neck"]], 1, 3]
+    assert baked.scene().collar == pytest.approx(sorted(heights)) and np.ptp(heights) > 0.05
