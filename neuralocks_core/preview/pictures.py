@@ -20,6 +20,8 @@ PANELS, MOST_PANELS = 6, 12
 """Pictures of a strip, spread over its frames, and the most frames that are all shown."""
 STANDING = 4.0
 """Seconds that the camera takes to go round a single frame."""
+LETTERS = 10, 1 / 38
+"""Least size of a strip's letters [pixels], and their size as a share of a picture's height: wide strips are looked at reduced."""
 PALETTE, DITHER = 5, 6.0
 """A .gif takes its colours from PALETTE frames of the clip; dithering changes them by DITHER of 255."""
 
@@ -121,8 +123,9 @@ def _strip(part: Path, images: Iterator[np.ndarray], names: list[str]) -> None:
     row = [piece for image in images for piece in (gap, image)][1:]
     strip = Image.fromarray(np.concatenate(row, axis=1))
     pen, wide = ImageDraw.Draw(strip), images[0].shape[1] + 4
+    size = max(LETTERS[0], round(LETTERS[1] * strip.height))
     for i, text in enumerate(names):
-        pen.text((wide * i + 10, strip.height - 20), text, fill=(230, 230, 230))
+        pen.text((wide * i + size, strip.height - 2 * size), text, fill=(230, 230, 230), font_size=size)
     strip.save(part)
 
 

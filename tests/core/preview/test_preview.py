@@ -197,6 +197,21 @@ def test_clothes_begin_between_shoulders_and_neck(collar, begins, size):
     assert skin[bare, 1].min() == pytest.approx(begins, abs=0.002) and not bare[-1]
 
 
+@pytest.mark.parametrize("height, least", [(128, 6), (620, 10), (1240, 20)])
+def test_a_strip_names_its_frames_in_letters_that_can_be_read(tmp_path, height, least):
+    """They had ten pixels in pictures of any size."""
+    from PIL import Image
+
+    black = np.zeros((height, height, 3), np.uint8)
+    preview._strip(tmp_path / "strip.png", iter([black, black]), ["frame 35", "frame 70"])
+    with Image.open(tmp_path / "strip.png") as image:
+        drawn = np.asarray(image)[..., 0] > 100
+    for picture in (drawn[:, :height], drawn[:, height + 4 :]):
+        rows, columns = np.flatnonzero(picture.any(axis=1)), np.flatnonzero(picture.any(axis=0))
+        assert least <= np.ptp(rows) + 1 < height / 10 and rows[-1] < height - 1
+        assert 0 < columns[0] and columns[-1] < 0.6 * height
+
+
 def never_drawn():
     return replace(scene(2, 20), hair=lambda frame: pytest.fail("the drawing was begun"))
 
