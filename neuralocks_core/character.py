@@ -157,10 +157,15 @@ class Character:
         return float(np.degrees(np.arctan2(self.facing[0, 2], self.facing[0, 0])))
 
     @property
-    def collar(self) -> tuple[float, float] | None:
-        """Heights of the left shoulder and of the neck in bind pose [m], lower first; None if joints do not tell."""
+    def collar(self) -> tuple[float, float, float] | None:
+        """In bind pose [m], heights of the left shoulder and of the neck, lower first, and how far aside of the neck the shoulder
+        is; None if joints do not tell.
+        """
         joints = self.humanoid.get("left_upper_arm"), self.humanoid.get("neck")
-        return None if None in joints else tuple(sorted(self.skeleton.bind[list(joints), 1, 3].tolist()))
+        if None in joints:
+            return None
+        shoulder, neck = self.skeleton.bind[list(joints), :3, 3]
+        return *sorted((float(shoulder[1]), float(neck[1]))), abs(float((self.facing @ (shoulder - neck))[0]))
 
     @cached_property
     def canonical_to_bind(self) -> np.ndarray:

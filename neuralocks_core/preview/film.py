@@ -23,6 +23,9 @@ MARGIN = 1.06
 """How many times as large as hair on top and at the sides of the head a picture is at least."""
 COLLAR = 0.25
 """How far below the middle of a grown-up's head clothes begin [m]."""
+SLEEVES = 1.7
+"""How many times as far aside as shoulders there are clothes below the neck at any height: in a T pose, arms are as high as
+the collar."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,8 @@ class Scene:
         mesh_hair: vertices of the body that are hair (V,) bool, or None.
         look: colours.
         size: how many times a person's size the character is.
-        collar: heights in bind pose [m] between which clothes begin, lower first, such as shoulders and neck; None if unknown.
+        collar: heights in bind pose [m] between which clothes begin, lower first, such as shoulders and neck, and how far aside
+            shoulders are [m]; None if unknown.
     """
 
     times: np.ndarray
@@ -76,7 +80,7 @@ class Scene:
     mesh_hair: np.ndarray | None = None
     look: shading.Look = field(default_factory=shading.Look)
     size: float = 1.0
-    collar: tuple[float, float] | None = None
+    collar: tuple[float, float, float] | None = None
 
     def life_size(self) -> "Scene":
         """The same with a giant shrunk to a person's size, at which cameras and light know what is near."""
@@ -93,7 +97,7 @@ class Scene:
             body=None if body is None else lambda frame: share * np.asarray(body(frame), float),
             body_rest=None if self.body_rest is None else share * self.body_rest,
             size=1.0,
-            collar=self.collar and (share * self.collar[0], share * self.collar[1]),
+            collar=self.collar and tuple(share * each for each in self.collar),
         )
 
 
@@ -192,8 +196,12 @@ class Film:
         collar = scene.centre[1] - COLLAR
         if scene.collar is not None:  # a child's head is nearer to its shoulders, a large one farther from its neck
             collar = min(max(collar, scene.collar[0]), scene.collar[1])
-        below = (collar - scene.body_rest[:, 1]) / 0.03
-        cloth = np.clip(below, 0, 1)[:, None]
+        below = collar - scene.body_rest[:, 1]
+        if scene.collar is not None:
+            aside = np.abs((scene.body_rest - scene.centre) @ scene.facing[0])
+            arms = scene.body_rest[:, 1] < scene.collar[1]  # a head may be wider
+            below = np.where(arms, np.maximum(below, aside - SLEEVES * scene.collar[2]), below)
+        cloth = np.clip(below / 0.03, 0, 1)[:, None]
         result = (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
         if scene.mesh_hair is not None:
             result[scene.mesh_hair] = self._locks()[scene.mesh_hair]

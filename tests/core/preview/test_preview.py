@@ -186,12 +186,14 @@ def test_the_picture_of_usual_hair_is_as_near_as_its_length_asks_for():
 
 
 @pytest.mark.parametrize("size", [1, 32])
-@pytest.mark.parametrize("collar, begins", [(None, 1.25), ((1.2, 1.3), 1.25), ((1.33, 1.38), 1.33), ((1.1, 1.2), 1.2)])
+@pytest.mark.parametrize(
+    "collar, begins", [(None, 1.25), ((1.2, 1.3, 0.2), 1.25), ((1.33, 1.38, 0.2), 1.33), ((1.1, 1.2, 0.2), 1.2)]
+)
 def test_clothes_begin_between_shoulders_and_neck(collar, begins, size):
     """Children were drawn bare down to the navel."""
     skin = CENTRE - np.linspace(0, 0.5, 500)[:, None] * [0, 1, 0]
     who = replace(scene(), size=size, centre=size * CENTRE, body_rest=size * skin, triangles=np.zeros((0, 3), int))
-    who = replace(who, rest=size * who.rest, collar=collar and (size * collar[0], size * collar[1]))
+    who = replace(who, rest=size * who.rest, collar=collar and tuple(size * each for each in collar))
     with closing(Film(who, 44, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
         bare = np.isclose(film._albedo, who.look.skin).all(axis=1)
     assert skin[bare, 1].min() == pytest.approx(begins, abs=0.002) and not bare[-1]
@@ -210,6 +212,22 @@ def test_a_strip_names_its_frames_in_letters_that_can_be_read(tmp_path, height, 
         rows, columns = np.flatnonzero(picture.any(axis=1)), np.flatnonzero(picture.any(axis=0))
         assert least <= np.ptp(rows) + 1 < height / 10 and rows[-1] < height - 1
         assert 0 < columns[0] and columns[-1] < 0.6 * height
+
+
+@pytest.mark.parametrize("degrees", [0, 90, 200])
+def test_arms_of_a_t_pose_have_sleeves(degrees):
+    """Below they were cloth, above skin, up to the hands. A head that is wider than shoulders is bare."""
+    angle = np.radians(degrees)
+    aside = np.array([np.cos(angle), 0, -np.sin(angle)])
+    head = CENTRE + np.linspace(-0.7, 0.7, 1401)[:, None] * aside
+    arms = head - [0, 0.2, 0]
+    facing = np.stack([aside, [0, 1, 0], np.cross(aside, [0, 1, 0])])
+    body = {"body_rest": np.concatenate([arms, head]), "triangles": np.zeros((0, 3), int)}
+    who = replace(scene(), facing=facing, collar=(1.2, 1.4, 0.2), **body)
+    with closing(Film(who, 44, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
+        bare = np.isclose(film._albedo, who.look.skin).all(axis=1)
+    assert bare[len(arms) :].all()
+    assert np.abs((arms - CENTRE) @ aside)[bare[: len(arms)]].max() == pytest.approx(0.34, abs=0.005)
 
 
 def never_drawn():

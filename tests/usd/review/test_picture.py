@@ -91,5 +91,7 @@ def test_the_commands_view_is_the_usual_one():
 def test_clothes_begin_at_the_shoulders_that_the_skeleton_has(hair):
     baked = read_baked(hair)
     character = baked.shot.grooms[0].attachment.character
-    heights = character.skeleton.bind[[character.humanoid["left_upper_arm"], character.humanoid["neck"]], 1, 3]
-    assert baked.scene().collar == pytest.approx(sorted(heights)) and np.ptp(heights) > 0.05
+    shoulder, neck = character.skeleton.bind[[character.humanoid["left_upper_arm"], character.humanoid["neck"]], :3, 3]
+    low, high, aside = baked.scene().collar
+    assert (low, high) == pytest.approx(sorted((shoulder[1], neck[1]))) and high - low > 0.05
+    assert aside == pytest.approx(np.linalg.norm((shoulder - neck)[[0, 2]]), rel=0.05)
