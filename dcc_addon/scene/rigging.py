@@ -149,10 +149,14 @@ def _lists(owner) -> list:
 
 def _read(data) -> list:
     """What drivers read, and no animation writes, of anything but objects' places."""
-    found = []
+    found, written = [], {}  # hundreds of drivers may read one rig
     for target in (t for curve in data.drivers for v in curve.driver.variables for t in v.targets):
         path, owner = target.data_path, target.id
-        if path and owner is not None and path not in animated(getattr(owner, "animation_data", None)):
+        if not path or owner is None:
+            continue
+        if owner not in written:
+            written[owner] = animated(getattr(owner, "animation_data", None))
+        if path not in written[owner]:
             found.append(value_of(owner, path))
     return found
 

@@ -3,6 +3,7 @@
 
 import math
 from pathlib import Path
+from unittest.mock import patch
 
 import bpy
 
@@ -46,6 +47,30 @@ def rendered_as_edited(_folder: Path) -> None:
         assert max(apart(after[frame], before[frame]) for frame in FRAMES) > 1e-3, edit.__name__
         assert max(apart(after[frame], drawn[frame]) for frame in FRAMES) < 1e-6, edit.__name__
         assert not messages(), messages()
+
+
+def many_drivers(_folder: Path) -> None:
+    """However many drivers read a rig, what animates it is listed as often as for one: in a control rig with hundreds of them, each
+    look at the unkeyed values would otherwise block Blender for seconds.
+    """
+    from dcc_addon.scene.animated import animated
+    from dcc_addon.scene.sampling import posture_of
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    rig["switch"] = 0.5
+    bones, listed = list(rig.pose.bones), []
+    for count in (1, len(bones)):
+        for bone in bones[:count]:
+            bone.driver_remove("location")
+            for curve in bone.driver_add("location"):
+                read = curve.driver.variables.new().targets[0]
+                read.id, read.data_path = rig, '["switch"]'
+        with patch("dcc_addon.scene.rigging.animated", wraps=animated) as listing:
+            seen = posture_of(rig, scene)
+        listed.append(listing.call_count)
+    assert listed[0] == listed[1]
+    rig["switch"] = 0.25
+    assert posture_of(rig, scene) != seen
 
 
 def _nothing(_rig) -> None:
