@@ -27,7 +27,7 @@ class stepping:
         self._scene = scene
 
     def __enter__(self):
-        self._frame = self._scene.frame_current, self._scene.frame_subframe
+        self._frame = self._scene.frame_current + self._scene.frame_subframe  # before frame 0, the fraction is negative
         self._unkeyed = Unkeyed(self._scene)
         self._live = {}
         for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_kept):
@@ -42,7 +42,7 @@ class stepping:
     def __exit__(self, *_):
         try:
             self._keyed.close()
-            self._scene.frame_set(self._frame[0], subframe=self._frame[1])
+            step(self._scene, self._frame)
             self._unkeyed.put_back()
             for name, turned in self._live.items():
                 if (armature := find(name)) is not None:

@@ -123,6 +123,19 @@ def not_keyed(_folder: Path) -> None:
     assert not (lost := [owner for owner in owners if owner["value"] != 2.0]), lost
 
 
+def between_frames(_folder: Path) -> None:
+    """Sampling ends at the frame and fraction that were shown, also before frame 0, where Blender's fractions are negative."""
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 5)
+    make_live(rig, strands)
+    for frame, fraction in ((-3, 0.25), (9, 0.3)):
+        before, shown = points_at(strands, frame, fraction), (scene.frame_current, scene.frame_subframe)
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        assert (scene.frame_current, scene.frame_subframe) == shown
+        assert apart(scenes.points(strands), before) < 1e-6
+
+
 def moved_hair(folder: Path) -> None:
     """A hair object that is moved makes the sampling stale, and the bake agrees again; stretched time changes nothing;
     objects that share their curves are refused, and neither is moved.
