@@ -22,6 +22,8 @@ HAIR = TRACK, BEFORE, TRACK + OVERRIDE, BEFORE + OVERRIDE
 """All names of these tracks."""
 KEPT = "neuralocks_rotations"
 """Property of the action that holds the hair bones' earlier rotations."""
+LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
+"""The number of this interpolation: that of many keys is written at once by numbers only."""
 STILL = 1e-6
 """Rotations that change by less than this over time do not move."""
 
@@ -242,8 +244,7 @@ def _action(armature, label: str, modes: dict[str, str], frames: np.ndarray, tur
             curve.keyframe_points.add(len(frames))
             keys = np.stack([frames, values], axis=1).astype(np.float32)
             curve.keyframe_points.foreach_set("co", keys.ravel())
-            for point in curve.keyframe_points:
-                point.interpolation = "LINEAR"
+            curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), LINEAR, np.int32))
             curve.update()
     return action
 

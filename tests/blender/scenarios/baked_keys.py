@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baked keys of hair bones beside what else turns them, and beside strands: keys of the artist's own, other bakes, Live."""
 
+import sys
 from pathlib import Path
 from unittest.mock import patch
 
@@ -54,6 +55,31 @@ def keyed_bones(folder: Path) -> None:
         assert not rig.animation_data.nla_tracks and not [a for a in bpy.data.actions if "Hair" in a.name]
         for frame, matrices in still.items():
             assert apart(bones_at(rig, frame), matrices) < 1e-6
+
+
+def many_keys(folder: Path) -> None:
+    """Keys are straight between frames, and are not made one by one, which for 60 bones took seconds during which Blender stood still."""
+    from dcc_addon.scene import actions
+
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    bpy.context.scene.neuralocks.subframes = 8
+    give_bone_model(rig, folder)
+    steps = []
+
+    def counted(frame, _event, _argument):
+        if frame.f_code.co_filename == actions.__file__:
+            steps.append(frame.f_lineno)
+        return counted
+
+    sys.settrace(counted)
+    try:
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    finally:
+        sys.settrace(None)
+    curves = scenes.fcurves_of(bpy.data.actions["Rig Hair"])
+    assert len(curves) == 4 and all(key.interpolation == "LINEAR" for curve in curves for key in curve.keyframe_points)
+    assert len(steps) < sum(len(curve.keyframe_points) for curve in curves)
 
 
 @patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
