@@ -139,8 +139,9 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
     written: dict[str, str] = {}
     with undone_on_failure(*outs, *map(shot_beside, outs)):
         for number, (out, look, names) in enumerate(groups):
-            shot = shot_beside(out)
-            prims = write_shot(shot, named(character), scene, sampled, [named(name) for name in names], undrawn)
+            shot, begin, end = shot_beside(out), *(0.5 + 0.5 * (number + done) / len(looks) for done in (0, 1))
+            own = [named(name) for name in names]
+            prims = yield from write_shot(shot, named(character), scene, sampled, own, undrawn, begin)
             job = Threaded(
                 lambda say, shot=shot, out=out, look=look: bake(
                     shot,
@@ -157,7 +158,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
                     progress=say,
                 )
             )
-            result = yield from job.steps(0.5 + 0.5 * number / len(looks), 0.5 + 0.5 * (number + 1) / len(looks))
+            result = yield from job.steps(begin, end)
             baked |= {name: (str(out), prims[name]) for name in names}
             written |= prims
             notes += [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in result.notes]

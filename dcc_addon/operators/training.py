@@ -128,7 +128,9 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         folder, out = temporary_folder(), None
         try:
             character = Path(folder.name) / "character.usdc"
-            prims = write_shot(character, armature, scene, sampled, [target] if self.kind == "strands" else [])
+            hairs = [target] if self.kind == "strands" else []
+            prims = yield from write_shot(character, armature, scene, sampled, hairs, share=1.0)
+            armature, target = named(name), named(wanted)
             out = _reserved(target.name_full)
             settings = {
                 "kind": self.kind,

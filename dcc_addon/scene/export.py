@@ -8,6 +8,7 @@ import numpy as np
 from ..services import names
 from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names, skin
+from ..services.threaded import Threaded
 from . import body as body_reader
 from . import curves
 from .carried import bodies_of
@@ -16,8 +17,9 @@ BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
 """The USD basis of each strand type that is not straight lines."""
 
 
-def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=()) -> dict[str, str]:
-    """Write the armature's motion, its body and hair at rest.
+def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=(), share: float = 0.0):
+    """Steps (done, total, message) of writing the armature's motion, its body and hair at rest. What is in Blender is read before the
+    first of them; a thread writes it, because a long shot takes seconds.
 
     Args:
         path: the USD file.
@@ -25,6 +27,7 @@ def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=()) -> dict[
         sampled: its `SampledRig`.
         hairs: hair objects to write, carried by the armature.
         undrawn: names of those that are invisible in the file.
+        share: of longer work that is done before.
 
     Returns:
         prim path of each object that was written, by name.
@@ -41,30 +44,29 @@ def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=()) -> dict[
     for joint, parent in enumerate(rig.parents):
         if parent >= 0:
             rest[joint] = np.linalg.inv(bind[parent]) @ bind[joint]
-    write_scene(
-        path,
-        SceneArrays(
-            metres_per_unit=motion.metres_per_unit,
-            rate=motion.rate,
-            frames=motion.frames,
-            joints=rig.paths,
-            bind=bind,
-            rest=rest,
-            translation=motion.translation,
-            rotation=motion.rotation,
-            scale=motion.scale,
-            skins=list(skins.values()),
-            shape=motion.shape,
-            hair=[
-                _hair(hair, label, sampled, hair.name_full not in undrawn)
-                for hair, label in zip(hairs, labels, strict=True)
-            ],
-            name=armature.name_full,
-        ),
+    arrays = SceneArrays(
+        metres_per_unit=motion.metres_per_unit,
+        rate=motion.rate,
+        frames=motion.frames,
+        joints=rig.paths,
+        bind=bind,
+        rest=rest,
+        translation=motion.translation,
+        rotation=motion.rotation,
+        scale=motion.scale,
+        skins=list(skins.values()),
+        shape=motion.shape,
+        hair=[
+            _hair(hair, label, sampled, hair.name_full not in undrawn)
+            for hair, label in zip(hairs, labels, strict=True)
+        ],
+        name=armature.name_full,
     )
     prims = {hair.name_full: prim_path(label) for hair, label in zip(hairs, labels, strict=True)}
-    prims |= {body: prim_path(arrays.name) for body, arrays in skins.items()}
-    return prims | {armature.name_full: RIG}
+    prims |= {body: prim_path(skinned.name) for body, skinned in skins.items()}
+    prims[armature.name_full] = RIG
+    yield from Threaded(lambda _: write_scene(path, arrays), "Writing the shot").steps(share, share)
+    return prims
 
 
 def _hair(hair, label: str, sampled, visible: bool):

@@ -2,6 +2,7 @@
 """What an artist does while longer work goes on, which takes events as ever."""
 
 import math
+import threading
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import patch
@@ -38,6 +39,32 @@ def touched_meanwhile(folder: Path) -> None:
     strands.neuralocks_hair.live = False
     at_frame(5, lambda: bpy.data.objects.remove(strands))
     refused(lambda: bake(filepath=str(folder / "gone.usdc")), "deleted or renamed")
+
+
+def written_meanwhile(folder: Path) -> None:
+    """Blender takes events while the shot of a bake is written, which takes seconds if it is long; what is deleted then is in it."""
+    from dcc_addon.operators.bake import bake_steps
+    from usd.assets import scene_writer
+
+    rig, held = scenes.armature(), threading.Event()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    live, write = points_at(strands, 9), scene_writer.write_scene
+
+    def write_later(path, arrays):
+        assert held.wait(5)
+        return write(path, arrays)
+
+    with patch.object(scene_writer, "write_scene", write_later):
+        steps = bake_steps(bpy.context, rig, [strands], str(folder / "out.usdc"))
+        assert any("Writing" in message for _, _, message in steps)
+        bpy.data.objects.remove(strands)
+        held.set()
+        assert any("Baking" in message for _, _, message in steps)
+        for _ in steps:
+            pass
+    assert apart(baked_points(folder / "out.usdc", "/Character/Hair_Hair", 9), live) < SAME
 
 
 @patch("dcc_addon.operators.base.SAMPLED", 0.0)
