@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 
 from .animated import animated
-from .lookup import find
 
 PLACE = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
 """Channels of objects and of bones, and their sizes."""
@@ -33,12 +32,14 @@ class Unkeyed:
 
     def put_back(self) -> None:
         """Restore the values that have changed since."""
+        own = {kind: _own_of(kind) for kind in {kind for kind, *_ in self._others}}
         for kind, name, within, path, value in self._others:
-            owner = _owner(getattr(bpy.data, kind).get(name), within)
+            owner = _owner(own[kind].get(name), within)
             if owner is not None and value_of(owner, path) not in (None, value):
                 _write(owner, path, value)
+        things = _own_of("objects")
         for name, kept in self._kept.items():
-            thing = find(name)
+            thing = things.get(name)
             if thing is None:
                 continue
             now = _channels(thing)
@@ -60,6 +61,11 @@ def value_of(owner, path: str):
     if isinstance(value, (bool, int, float, str)):
         return value
     return list(value) if hasattr(value, "__len__") else None
+
+
+def _own_of(kind: str) -> dict:
+    """What this file itself has in a collection of `bpy.data`, by name; Blender's own look-up compares name after name."""
+    return {thing.name: thing for thing in getattr(bpy.data, kind) if thing.library is None}
 
 
 def _kinds() -> list[str]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live hair follows what is posed and moved by hand, and what is edited is noticed: its motion is sampled again."""
 
+import time
 from pathlib import Path
 
 import bpy
@@ -134,6 +135,27 @@ def between_frames(_folder: Path) -> None:
         assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
         assert (scene.frame_current, scene.frame_subframe) == shown
         assert apart(scenes.points(strands), before) < 1e-6
+
+
+def many_animated(_folder: Path) -> None:
+    """In a scene of thousands of animated objects, putting unkeyed values back takes little longer than reading them, since objects
+    are not looked up one by one: both are done before and after each slice of sampling.
+    """
+    from dcc_addon.scene.unkeyed import Unkeyed
+
+    action, scene = bpy.data.actions.new("Crowd"), bpy.context.scene
+    for number in range(3000):
+        thing = bpy.data.objects.new(f"Extra {number:04d}", None)
+        scene.collection.objects.link(thing)
+        thing.animation_data_create().action = action
+    began = time.thread_time()
+    unkeyed = Unkeyed(scene)
+    read = time.thread_time() - began
+    thing.location.x = 1.0
+    began = time.thread_time()
+    unkeyed.put_back()
+    assert thing.location.x == 0.0
+    assert time.thread_time() - began < 3 * read
 
 
 def moved_hair(folder: Path) -> None:
