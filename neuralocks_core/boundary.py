@@ -7,6 +7,9 @@ same on every rig; and the history holds effective gravity in the head's frame, 
 be seen. `docs/deviations.md` says why.
 """
 
+import math
+from numbers import Real
+
 import numpy as np
 
 from neuralocks_core import rotation
@@ -16,7 +19,8 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import UNREAD, at_weight_one
 from neuralocks_core.measures import measures_read
-from neuralocks_core.motion import GRAVITY, Clip, G
+from neuralocks_core.motion import GRAVITY, Clip, G, time_array
+from neuralocks_core.number_arrays import number_array
 from neuralocks_core.stepped import Stepped
 from neuralocks_core.track import Track
 from neuralocks_core.wind import Wind, check_felt
@@ -84,19 +88,19 @@ class BoundarySampler:
             wind: added to the history, whatever the strength: hair feels a wind w as it feels the head accelerate by -w.
 
         Raises:
-            NeuralocksError: a time, material or strength is not finite, an array has the wrong shape, or there is a wind
+            NeuralocksError: a time, material or strength is not a finite number, an array has the wrong shape, or there is a wind
                 that this spec has no place for.
         """
-        spec, times = self.spec, np.atleast_1d(np.asarray(times, float))
-        if times.ndim > 1:
-            raise NeuralocksError(f"times: are of shape {times.shape}; give (n,) seconds")
+        spec, times = self.spec, time_array(times)
         if not np.isfinite(times).all():
             raise NeuralocksError("times: hold NaN or infinity; give seconds")
-        if not np.isfinite(strength):
+        if not (isinstance(strength, Real) and math.isfinite(strength)):
             raise NeuralocksError(f"strength {strength}: give a number, 0 for the held pose")
-        count = len(self.character.skeleton.names)
-        if joints is not None and np.shape(joints) != (len(times), count, 4, 4):
-            raise NeuralocksError(f"joints: are of shape {np.shape(joints)}; give {(len(times), count, 4, 4)}")
+        if joints is not None:
+            wanted = len(times), len(self.character.skeleton.names), 4, 4
+            joints = number_array("joints", joints, f"{wanted}")
+            if joints.shape != wanted:
+                raise NeuralocksError(f"joints: are of shape {joints.shape}; give {wanted}")
         if not len(times):
             return np.zeros((0, spec.size), np.float32)
         ratios, pace = _read(material, len(times))
@@ -124,7 +128,10 @@ class BoundarySampler:
         parts = self.spec.slices
         result[parts["pose"]] = self.stance[..., :2].swapaxes(-1, -2).ravel()
         result[parts["gravity"]] = GRAVITY / G
-        result[parts["shape"]] = self._measures(self.clip.shape[0] if shape is None else shape)
+        wanted = f"({self.clip.shape.shape[1]},) blend shape weights"
+        result[parts["shape"]] = self._measures(
+            self.clip.shape[0] if shape is None else number_array("shape", shape, wanted)
+        )
         result[parts["material"]] = _read(material)[0]
         return result
 
@@ -172,6 +179,8 @@ class BoundarySampler:
 
     def _blown(self, wind: Wind, turns: np.ndarray, times: np.ndarray) -> np.ndarray:
         """What a wind adds to `_history`, with the head's rotations at times (n, L)."""
+        if not isinstance(wind, Wind):
+            raise NeuralocksError(f"wind {wind!r}: is not a wind; give a neuralocks_core.wind.Wind")
         check_felt(self.spec.feels_wind)
         push = wind.at(times[:, :-2], self.clip.period) / G
         rows = np.zeros((*push.shape[:2], self.spec.per_bin))
@@ -202,7 +211,7 @@ def _stance(character: Character, name: str) -> np.ndarray:
 
 def _read(material, *count: int) -> tuple[np.ndarray, np.ndarray]:
     """What vectors hold of a material, (4,) or (n, 4) for a `count`, and the motion's speed in them, () or (n,)."""
-    material = np.asarray(material, float)
+    material = number_array("material", material, f"({MATERIALS},) log-ratios, as Material.log_ratios does")
     if material.shape not in ((MATERIALS,), (*count, MATERIALS)) or not np.isfinite(material).all():
         raise NeuralocksError(f"material {material}: give {MATERIALS} log-ratios, as Material.log_ratios does")
     given = np.broadcast_to(material, (*count, MATERIALS))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.number_arrays import number_array
 from neuralocks_core.rotation import from_vector, polar, to_vector
 
 G = 9.81
@@ -18,6 +19,8 @@ LARGEST_CLIP = 4_000_000
 """Most joint samples of one file's animation: 512 MB. More come from a stray key frame, not from a shot."""
 LOOP_GAP = 2.0
 """Turn of a joint from the last sample of a loop to its first [degrees] beyond which a user is told."""
+
+_WANTED = {"times": "(T,) seconds", "joints": "(T, J, 4, 4)", "shape": "(T, B) weights", "cuts": "(C,) seconds"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +46,15 @@ class Clip:
     cuts: np.ndarray = ()
 
     def __post_init__(self):
-        object.__setattr__(self, "times", np.asarray(self.times, float))
-        object.__setattr__(self, "joints", np.asarray(self.joints, float))
-        shape = np.zeros((len(self.times), 0)) if self.shape is None else np.asarray(self.shape, float)
-        object.__setattr__(self, "shape", shape)
-        object.__setattr__(self, "cuts", np.asarray(self.cuts, float))
+        for name, wanted in _WANTED.items():
+            given = getattr(self, name)
+            if name != "shape" or given is not None:
+                object.__setattr__(self, name, number_array(f"animation's {name}", given, wanted))
+        if self.times.ndim != 1:
+            raise NeuralocksError(f"animation: its times are of shape {self.times.shape}; give (T,) seconds")
         count = len(self.times)
+        shape = np.zeros((count, 0)) if self.shape is None else self.shape
+        object.__setattr__(self, "shape", shape)
         if not count:
             raise NeuralocksError("animation: it has no samples; animate the skeleton over the frames to bake")
         if self.joints.ndim != 4 or self.joints.shape[0] != count or self.joints.shape[2:] != (4, 4):
@@ -102,7 +108,7 @@ class Clip:
         Between samples, translation and stretch are linear and rotation takes the shortest arc; outside, the nearest
         sample is held (or the loop continues).
         """
-        times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
+        times = self.wrapped(time_array(times))
         low, fraction = self._bracket(times)
         result, between = self.joints[low], fraction >= 1e-9
         # Blending nothing takes as long as blending a pose, and in a crowd, each clip is asked for its ends by all others.
@@ -113,7 +119,7 @@ class Clip:
 
     def shape_at(self, times) -> np.ndarray:
         """Blend shape weights (n, B) at times (n,) [s], linear between samples."""
-        times = self.wrapped(np.atleast_1d(np.asarray(times, float)))
+        times = self.wrapped(time_array(times))
         if not self.shape.shape[1]:  # most clips have none, and live hair asks in every frame
             return np.zeros((len(times), 0))
         low, fraction = self._bracket(times)
@@ -144,6 +150,18 @@ class Clip:
             np.where(fraction > 1 - 1e-9, 0.0, fraction),
         )
         return low, fraction
+
+
+def time_array(given) -> np.ndarray:
+    """Times (n,) [s] that a caller gives, one or several.
+
+    Raises:
+        NeuralocksError: these are no numbers, or not in one row.
+    """
+    times = np.atleast_1d(number_array("times", given, "(n,) seconds"))
+    if times.ndim > 1:
+        raise NeuralocksError(f"times: are of shape {times.shape}; give (n,) seconds")
+    return times
 
 
 def _blend(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ chunk per core at a time.
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
+from numbers import Integral
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from neuralocks_core.errors import NeuralocksError, about, fact_of
 from neuralocks_core.measures import another_body, known_body
 from neuralocks_core.motion import Clip
 from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND
+from neuralocks_core.number_arrays import number_array
 
 CHUNK = 512
 """Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed, so that results
@@ -52,10 +54,10 @@ class StrandModel:
 
     Args:
         file: a model read by `model.read`.
-        threads: number of chunks of strands processed at a time; the result does not depend on it.
+        threads: number of chunks of strands processed at a time, by default one a core; the result does not depend on it.
 
     Raises:
-        NeuralocksError: its description or graphs are not those of a strand model.
+        NeuralocksError: its description or graphs are not those of a strand model, or `threads` is no such number.
     """
 
     def __init__(self, file: model_file.ModelFile, threads: int | None = None):
@@ -66,6 +68,8 @@ class StrandModel:
         self.anchored = file.meta.get("anchored", False)
         if not isinstance(self.anchored, bool):
             raise NeuralocksError(f"{file.path}: its 'anchored' is neither true nor false; get an undamaged copy")
+        if threads is not None and not (isinstance(threads, Integral) and threads >= 1):
+            raise NeuralocksError(f"threads {threads!r}: must be a whole number from 1 on; leave it out for one a core")
         self.threads = threads or cores()
         self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="neuralocks")
         self._sessions = {name: graph_session(file, name) for name in model_file.KINDS["strands"]}
@@ -78,7 +82,7 @@ class StrandModel:
         Raises:
             NeuralocksError: it is missing, damaged, of a later format or not a model of strands.
         """
-        return cls(model_file.read(path or model_file.shipped("strands"), "strands"), threads)
+        return cls(model_file.read(model_file.shipped("strands") if path is None else path, "strands"), threads)
 
     @property
     def feels_wind(self) -> bool:
@@ -104,8 +108,10 @@ class StrandModel:
         docs/architecture.md, The model file.
 
         Raises:
-            NeuralocksError: it cannot be computed, is not finite, or too large for hair.
+            NeuralocksError: an array is not of numbers or has other rows, or the output cannot be computed, is not finite, or too
+                large for hair.
         """
+        inputs = {name: self._rows(graph, name, given) for name, given in inputs.items()}
         shape = len(next(iter(inputs.values()))), OUT[graph][output]
         return self._sane(graph, self._computed(graph, [output], inputs)[0], shape)
 
@@ -114,14 +120,34 @@ class StrandModel:
         float32, and more if the frame changes the weights of the tail (docs/architecture.md, The model file).
 
         Raises:
-            NeuralocksError: it cannot be computed, is not finite, or too large for hair.
+            NeuralocksError: it is not of this length or not of numbers, or the result cannot be computed, is not finite, or too
+                large for hair.
         """
-        row = np.asarray(vector, np.float32).reshape(1, -1)
-        values = self._computed("frame.onnx", list(self._shared), {"frame": row})
+        values = self._computed("frame.onnx", list(self._shared), {"frame": self.vector(vector)[None]})
         return {
             name: self._sane("frame.onnx", value, (1 if name == "frame_part" else HIDDEN, self._shared[name]))
             for name, value in zip(self._shared, values)
         }
+
+    def vector(self, given) -> np.ndarray:
+        """A boundary vector that a caller gives, (spec.size,) float32.
+
+        Raises:
+            NeuralocksError: it is not of this length, or not of numbers.
+        """
+        wanted = f"({self.spec.size},)"
+        vector = number_array("vector", given, f"{wanted} of a boundary vector", np.float32)
+        if vector.shape != (self.spec.size,):
+            raise NeuralocksError(f"vector: is of shape {vector.shape}; this model reads {wanted}")
+        return vector
+
+    def _rows(self, graph: str, name: str, given) -> np.ndarray:
+        """An input of a graph that a caller gives, (n, width) float32."""
+        width = self._reads[graph][name]
+        rows = number_array(name, given, f"(n, {width})", np.float32)
+        if rows.ndim != 2 or rows.shape[1] != width:
+            raise NeuralocksError(f"{name}: is of shape {rows.shape}; {graph} reads (n, {width})")
+        return rows
 
     def _check_graphs(self) -> None:
         """Refuse graphs that are not those of docs/architecture.md, before any of them is run.
@@ -134,14 +160,14 @@ class StrandModel:
         given = {value.name for value in self._sessions["frame.onnx"].get_outputs()}
         self._shared = OUT["frame.onnx"] | (CHANGED if given & set(CHANGED) else {})
         gives = OUT | {"frame.onnx": self._shared}
-        reads = IN | {
+        self._reads = IN | {
             "strand.onnx": {"strand": self.strand_size},
             "frame.onnx": {"frame": self.spec.size},
             "tail.onnx": IN["tail.onnx"] | self._shared,
         }
         for name, session in self._sessions.items():
             for does, wanted, values in (
-                ("reads", reads[name], session.get_inputs()),
+                ("reads", self._reads[name], session.get_inputs()),
                 ("gives", gives[name], session.get_outputs()),
             ):
                 found = {value.name: value.shape[-1] if value.shape else 1 for value in values}

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.number_arrays import number_array
 
 STRONGEST = 8.0
 """Largest mean of a wind [m/s^2]: beyond this, nobody has measured how far models are off."""
@@ -40,12 +42,12 @@ class Wind:
     gusts: float = 0.5
 
     def __post_init__(self):
-        mean = np.asarray(self.mean, float)
+        mean = number_array("wind", self.mean, "three numbers [m/s^2]")
         if mean.shape != (3,) or not np.isfinite(mean).all():
             raise NeuralocksError(f"wind: {self.mean} is not a vector; give three numbers [m/s^2]")
         if (size := math.hypot(*mean)) > STRONGEST * (1 + 1e-6):
             raise NeuralocksError(f"wind: is {size:.3g} m/s^2 strong; give at most {STRONGEST:g} (gravity is 9.81)")
-        if not 0 <= self.gusts <= 1:
+        if not (isinstance(self.gusts, Real) and 0 <= self.gusts <= 1):
             raise NeuralocksError(f"gusts {self.gusts}: give a share of the wind from 0 to 1")
         object.__setattr__(self, "mean", tuple(mean.tolist()))
 

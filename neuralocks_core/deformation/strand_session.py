@@ -10,7 +10,6 @@ from threading import Lock
 import numpy as np
 
 from neuralocks_core.deformation.clumping import Locks
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES, UNREAD
 from neuralocks_core.network_sizes import HIDDEN, SHAPE, K
 from neuralocks_core.runtime import StrandModel
@@ -58,7 +57,7 @@ class StrandSession:
         Call `anchor` first if materials or body shape changed. Invalid strands stay at rest.
 
         Raises:
-            NeuralocksError: the vector has the wrong shape.
+            NeuralocksError: the vector has the wrong shape, or is not one of numbers.
         """
         frame, gather = self._frame(vector)
         result = self._tail("displacement", frame, gather)
@@ -69,6 +68,7 @@ class StrandSession:
 
     def _frame(self, vector: np.ndarray):
         """What all strands share in a frame: the tail's inputs, and how to change a chunk's displacement afterwards."""
+        vector = self.model.vector(vector)
         frame = self.model.frame(self._read(vector))
         material = vector[self.model.spec.slices["material"]]
         if not material[CLUMPING]:  # exactly 0 for the default
@@ -82,9 +82,7 @@ class StrandSession:
 
     def _read(self, vector: np.ndarray) -> np.ndarray:
         """What the network is given of a vector."""
-        read = np.array(vector, np.float32)
-        if read.shape != (self.model.spec.size,):
-            raise NeuralocksError(f"vector: is of shape {read.shape}; this model reads ({self.model.spec.size},)")
+        read = self.model.vector(vector).copy()
         read[self.model.spec.slices["material"]][UNREAD] = 0
         return read
 

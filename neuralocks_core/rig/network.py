@@ -18,6 +18,7 @@ from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.motion import Clip
+from neuralocks_core.number_arrays import number_array
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import half_turns
 from neuralocks_core.wind import Wind
@@ -120,19 +121,23 @@ class RigModel:
             local rotation * q.
 
         Raises:
-            NeuralocksError: the number of features is not the model's.
+            NeuralocksError: these are no numbers, or not as many as the model reads.
         """
-        features = np.asarray(features)
-        if features.dtype != np.float32:  # numbers too large for single precision are beyond the limits anyway
-            features = np.clip(features, -LARGEST, LARGEST).astype(np.float32)
-        if features.ndim not in (1, 2) or features.shape[-1] != self.inputs:
-            raise NeuralocksError(f"features: shape {features.shape}; the model reads {self.inputs} numbers per avatar")
+        features = self._features(features)
         rows = np.atleast_2d(features)
         result = np.empty((len(rows), len(self.chains), 4), np.float32)
         for start in range(0, len(rows), _CHUNK):  # stays in the processor's cache
             raw = self._raw(rows[start : start + _CHUNK]).reshape(-1, len(self.chains), 3)
             _bounded(raw, np.float32(np.sin(self.max_angle / 2)), result[start : start + _CHUNK])
         return result[0] if features.ndim == 1 else result
+
+    def _features(self, given) -> np.ndarray:
+        """(F,) or (B, F) float32; numbers too large for it are beyond the limits anyway."""
+        wanted = f"{self.inputs} numbers per avatar, ({self.inputs},) or (B, {self.inputs})"
+        features = number_array("features", given, wanted, np.float32)
+        if features.ndim not in (1, 2) or features.shape[-1] != self.inputs:
+            raise NeuralocksError(f"features: are of shape {features.shape}; this model reads {wanted}")
+        return features
 
     def _raw(self, rows: np.ndarray) -> np.ndarray:
         (weight, bias), *others = self.layers
@@ -147,8 +152,8 @@ class RigModel:
         return value
 
     def canonical_turns(self, features: np.ndarray) -> np.ndarray:
-        """Turns (B, N, 4) wxyz float64 in canonical axes for features (B, F)."""
-        raw = self._raw(np.atleast_2d(np.asarray(features, np.float32))).reshape(-1, len(self.chains), 3).astype(float)
+        """Turns (B, N, 4) wxyz float64 in canonical axes for features (B, F); errors as in `evaluate`."""
+        raw = self._raw(np.atleast_2d(self._features(features))).reshape(-1, len(self.chains), 3).astype(float)
         return half_turns(np.einsum("nij,bnj->bni", self.chains.axes, raw), self.max_angle)
 
     def save(self, path) -> Path:

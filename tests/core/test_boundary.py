@@ -298,7 +298,12 @@ def test_an_impossible_description_is_refused_in_one_line(values):
     (
         ({"material": [np.nan] * 4}, "material .*give 4 log-ratios"),
         ({"material": [0.0] * 3}, "material .*give 4 log-ratios"),
+        ({"material": "soft"}, "material: is not an array of numbers; give .4,. log-ratios"),
         ({"strength": np.nan}, "strength nan: give a number"),
+        ({"strength": "1"}, "strength 1: give a number"),
+        ({"strength": [1.0, 2.0]}, "strength .1.0, 2.0.: give a number"),
+        ({"wind": (0, 0, 2)}, "wind .0, 0, 2.: is not a wind; give a .*Wind"),
+        ({"joints": [[1], [2, 3]]}, "joints: is not an array of numbers; give .1, 6, 4, 4."),
         ({"joints": np.eye(4)}, "joints: are of shape .* give .1, 6, 4, 4."),
     ),
 )

@@ -85,6 +85,26 @@ def test_cuts_that_are_no_times_are_refused(cuts):
 
 
 @pytest.mark.parametrize("ask", (Clip.at, Clip.shape_at))
-def test_a_time_that_is_none_is_refused(ask):
-    with pytest.raises(NeuralocksError, match="times: hold NaN"):
-        ask(moved([0.0, 1.0]), [0.5, np.nan])
+@pytest.mark.parametrize(
+    ("times", "fact"),
+    [
+        ([0.5, np.nan], "hold NaN"),
+        ("x", "is not an array of numbers; give .n,. seconds"),
+        ([[0.5]], "are of shape .1, 1."),
+    ],
+)
+def test_a_time_that_is_none_is_refused(ask, times, fact):
+    with pytest.raises(NeuralocksError, match=f"times: {fact}"):
+        ask(moved([0.0, 1.0]), times)
+
+
+@pytest.mark.parametrize("change", [{"times": "ab"}, {"joints": None}, {"shape": [[1], [2, 3]]}, {"cuts": None}])
+def test_what_is_no_array_of_numbers_is_named(change):
+    given = {"times": [0.0, 1.0], "joints": np.tile(bind(), (2, 1, 1, 1))} | change
+    with pytest.raises(NeuralocksError, match=f"animation's {next(iter(change))}: is not an array of numbers; give"):
+        Clip(**given)
+
+
+def test_times_are_one_row():
+    with pytest.raises(NeuralocksError, match=r"animation: its times are of shape \(\); give \(T,\) seconds"):
+        Clip(0.0, bind()[None])

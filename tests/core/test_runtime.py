@@ -70,8 +70,30 @@ def test_split_inference_equals_the_whole_network(path, net, strands):
         expected = deform(offsets[:1], torch.tensor(strands.rest), offsets[1:], path.stem)[0].numpy()
     expected[7] = 0
     assert np.abs(session.displacement(vector) - expected).max() < 1e-5
-    with pytest.raises(NeuralocksError, match=r"vector: is of shape \(5,\); this model reads"):
-        session.displacement(vector[:5])
+    assert np.array_equal(session.displacement(vector.tolist()), session.displacement(vector))
+
+
+def test_what_the_network_does_not_read_is_named(path, strands):
+    """As the caller's argument, not as damage of the model."""
+    runner = StrandModel.load(path, threads=1)
+    session = StrandSession(runner, strands.subset(slice(2)))
+    for read in (session.displacement, session.anchor, runner.frame):
+        with pytest.raises(NeuralocksError, match=r"vector: is of shape \(5,\); this model reads \(\d+,\)"):
+            read(np.zeros(5))
+        with pytest.raises(NeuralocksError, match=r"vector: is not an array of numbers; give \(\d+,\) of a boundary"):
+            read("x")
+    for rows, fact in (
+        (None, "is not an array of numbers"),
+        (np.zeros(72), "is of shape"),
+        (np.zeros((2, 3)), "is of shape"),
+    ):
+        with pytest.raises(NeuralocksError, match=rf"^shape: {fact}.* \(n, 72\)"):
+            runner.run("encoder.onnx", "code", shape=rows)
+    for threads in (0, -1, 1.5, "2"):
+        with pytest.raises(NeuralocksError, match=rf"threads '?{threads}'?: must be a whole number from 1 on"):
+            StrandModel.load(path, threads=threads)
+    with pytest.raises(NeuralocksError, match="is a folder"):  # the current one, and not the shipped model
+        StrandModel.load("")
 
 
 def test_a_model_that_reads_no_rest_points_is_given_none(path, net, strands, tmp_path):

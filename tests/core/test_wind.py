@@ -58,6 +58,8 @@ def test_a_wind_straight_up_or_down_has_gusts_across_too(mean):
         ((6, 6, 6), 0.5, "is 10.4 m/s\\^2 strong; give at most 8"),
         ((np.nan, 0, 0), 0.5, "is not a vector"),
         ((1, 0), 0.5, "is not a vector"),
+        ("strong", 0.5, "wind: is not an array of numbers; give three"),
+        ((1, 0, 0), "0.5", "gusts 0.5: give a share"),
         ((1, 0, 0), 1.5, "gusts 1.5: give a share of the wind from 0 to 1"),
         ((1, 0, 0), np.nan, "gusts nan"),
     ],

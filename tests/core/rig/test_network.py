@@ -113,3 +113,27 @@ def test_forged_chains_are_refused_in_one_line(forged, said):
     assert len(HairChains.from_json(values)) == 16
     with pytest.raises(NeuralocksError, match=said):
         HairChains.from_json(values | forged)
+
+
+@pytest.mark.parametrize(
+    "given", [None, "x", {}, [[1, 2], [3]], np.array(["a"]), 1j, [10**400], np.datetime64("2020-01-01")]
+)
+def test_features_that_are_no_numbers_are_refused(given):
+    model = random_model()
+    for read in (model.evaluate, model.canonical_turns):
+        with pytest.raises(
+            NeuralocksError, match=rf"features: is not an array of numbers; give {model.inputs} numbers per avatar"
+        ):
+            read(given)
+
+
+def test_features_of_another_shape_are_refused_and_huge_ones_cut_off():
+    model = random_model()
+    for read in (model.evaluate, model.canonical_turns):
+        for shape in ((), (3,), (0,), (2, 3, 4), (1, 2, model.inputs)):
+            with pytest.raises(
+                NeuralocksError, match=rf"features: are of shape .*; this model reads {model.inputs} numbers per avatar"
+            ):
+                read(np.zeros(shape))
+        same = [read(np.full(model.inputs, huge)) for huge in (1e300, 1e6)]
+        np.testing.assert_array_equal(*same)
