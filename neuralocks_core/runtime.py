@@ -18,6 +18,7 @@ from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, about, fact_of
+from neuralocks_core.graph_check import odd_part
 from neuralocks_core.measures import another_body, known_body
 from neuralocks_core.motion import Clip
 from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND
@@ -230,8 +231,16 @@ def graph_session(file: model_file.ModelFile, name: str):
     """The onnxruntime session of one graph of a model.
 
     Raises:
-        NeuralocksError: onnxruntime cannot load it.
+        NeuralocksError: it has operations that no model of ours has, or onnxruntime cannot load it.
     """
+    try:
+        odd = odd_part(file.graphs[name])
+    except ValueError as error:
+        raise NeuralocksError(f"{file.path}: {name} cannot be loaded ({error}); get an undamaged copy") from None
+    if odd:
+        raise NeuralocksError(
+            f"{file.path}: {name} has {odd}, as no model of this version has; get another copy, or update neuralocks"
+        )
     # Its official builds report sessions and the models' names to their maker, and keep an identifier in the home folder,
     # unless this is set before the first import; if that came too late, and on Windows, the call below stops further reports.
     os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
@@ -242,6 +251,9 @@ def graph_session(file: model_file.ModelFile, name: str):
     options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
     options.enable_cpu_mem_arena = False  # it keeps 13 MB in two threads, and saves at most a hundredth of the time
     options.log_severity_level = 4  # errors are raised anyway
+    options.add_session_config_entry(
+        "session.load_model_format", "ONNX"
+    )  # not its own format, which `odd_part` cannot read
     try:
         return onnxruntime.InferenceSession(file.graphs[name], options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises its own bare types for all errors in a graph

@@ -235,18 +235,45 @@ def test_graphs_in_each_others_place_are_refused(path, tmp_path):
         StrandModel.load(rewritten(path, tmp_path / "m.neuralocks", **changes))
 
 
-def test_a_graph_that_fails_while_it_is_computed_is_one_line(path, strands, tmp_path):
-    onnx = pytest.importorskip("onnx")
+def encoder(onnx, nodes, constants=()):
+    """A graph with the inputs and outputs of a strand encoder."""
     described = onnx.helper.make_tensor_value_info
     read, given = (described(n, onnx.TensorProto.FLOAT, ["S", k]) for n, k in (("shape", 72), ("code", 32)))
-    beyond = onnx.helper.make_tensor("columns", onnx.TensorProto.INT64, [32], [72] * 32)
-    nodes = [onnx.helper.make_node("Gather", ["shape", "columns"], ["code"], axis=1)]
-    graph = onnx.helper.make_graph(nodes, "g", [read], [given], [beyond])
-    made = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8)
-    broken = rewritten(path, tmp_path / "m.neuralocks", encoder_onnx=made.SerializeToString())
+    graph = onnx.helper.make_graph(nodes, "g", [read], [given], constants)
+    return onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8)
+
+
+def test_a_graph_that_fails_while_it_is_computed_is_one_line(path, strands, tmp_path):
+    onnx = pytest.importorskip("onnx")
+    nodes = [onnx.helper.make_node("Reshape", ["shape", "rows"], ["code"])]
+    graph = encoder(onnx, nodes, [onnx.helper.make_tensor("rows", onnx.TensorProto.INT64, [2], [7, 32])])
+    broken = rewritten(path, tmp_path / "m.neuralocks", encoder_onnx=graph.SerializeToString())
     with pytest.raises(NeuralocksError, match="encoder.onnx cannot be computed ") as caught:
         StrandSession(StrandModel.load(broken), strands)
     assert "\n" not in str(caught.value)
+
+
+def test_graphs_that_are_none_of_ours_are_never_loaded(path, tmp_path):
+    """They may run for ever, fill the memory, or read another file."""
+    onnx = pytest.importorskip("onnx")
+    node = onnx.helper.make_node
+    endless, outside, function, foreign = (
+        onnx.load_model_from_string(model.read(path).graphs["encoder.onnx"]) for _ in range(4)
+    )
+    body = encoder(onnx, [node("Relu", ["shape"], ["code"])]).graph
+    endless.graph.node.append(node("Loop", ["", "", "code"], ["all"], body=body))
+    outside.graph.initializer[0].data_location = onnx.TensorProto.EXTERNAL
+    function.functions.append(onnx.helper.make_function("", "Gemm", ["a"], ["b"], [node("Relu", ["a"], ["b"])], []))
+    foreign.graph.node[0].domain = "com.microsoft"
+    for graph, odd in (
+        (endless, "the operation 'Loop'"),
+        (outside, "numbers that lie in another file"),
+        (function, "functions of its own"),
+        (foreign, "the operation 'com.microsoft'"),
+    ):
+        odd_model = rewritten(path, tmp_path / "m.neuralocks", encoder_onnx=graph.SerializeToString())
+        with pytest.raises(NeuralocksError, match=f"encoder.onnx has {odd}, as no model of this version has; get"):
+            StrandModel.load(odd_model)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
