@@ -20,6 +20,12 @@ def fact_of(error: BaseException) -> str:
     return (str(error).strip() or type(error).__name__).splitlines()[0]
 
 
+def reworded(error: NeuralocksError, text: str) -> NeuralocksError:
+    """The same error with another message: its type and attributes tell what it is about."""
+    error.args = (text,)
+    return error
+
+
 @contextmanager
 def about(subject):
     """Prefix errors raised in this block with the subject, such as the path of the file being read."""

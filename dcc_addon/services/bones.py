@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neuralocks_core.character import Character
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, reworded
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
 from neuralocks_core.rig.carried import CarriedHair
@@ -36,7 +36,7 @@ def chains_of(rig: RigArrays, character: Character, wanted: str = "") -> HairCha
     except NeuralocksError as error:
         # Joints that the patterns became are not what the artist wrote.
         text = re.sub("--chains [^:]*:", lambda _: f"--chains {wanted}:", str(error), count=1)
-        raise type(error)(rig.said(text.replace("skeleton:", f"{rig.name}:", 1))) from None
+        raise reworded(error, rig.said(text.replace("skeleton:", f"{rig.name}:", 1))) from None
 
 
 def own_turns(own: np.ndarray, motion: Motion, joints: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -79,7 +79,7 @@ class LiveBones:
             chains = placed_chains(model.chains, character)
             model.chains.check_same(chains)
         except NeuralocksError as error:
-            raise type(error)(rig.said(str(error))) from None
+            raise reworded(error, rig.said(str(error))) from None
         return cls(model, tuple(rig.bones[j] for j in chains.joints), chains.joints, chains)
 
     def follow(self, character: Character, clip: Clip) -> None:

@@ -9,7 +9,7 @@ from pxr import Usd, UsdSkel
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, reworded
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import NoHairChains, fits
 from neuralocks_core.rig.measuring import UNEVEN, placed_chains
@@ -143,18 +143,17 @@ def read_rigged_hairs(
         except NeuralocksError as error:
             check()  # the error may come from a stop by the user
             bare += [] if source is None else [source]
-            errors.append((str(prim.GetPath()), _is_hairy(prim, model), type(error), _with_path(prim, error)))
+            errors.append((str(prim.GetPath()), _is_hairy(prim, model), reworded(error, _with_path(prim, error))))
             continue
         found.append(RiggedHair(stage, border, source, rig))
     # Hair may have its own skeleton besides the body's; the error should not be that the body's has no hair.
     hairy = [error for error in errors if error[1]]
     if not found:
-        *_, kind, text = (hairy or errors)[0]
-        raise kind(text)
+        raise (hairy or errors)[0][-1] from None
     if model is None:
         others = bare if skeleton is None else Others([hair.source for hair in found], stage, head, joints).maybe_same()
         found = _on_whole_bodies(found, others)
-    return found, [of_skeleton(path, text) for path, *_, text in hairy]
+    return found, [of_skeleton(path, error) for path, *_, error in hairy]
 
 
 def _on_whole_bodies(found: list[RiggedHair], others: list[StageRig]) -> list[RiggedHair]:

@@ -10,7 +10,7 @@ from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.character import Character, Skeleton
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, reworded
 from neuralocks_core.motion import Clip
 
 from ..border.amounts import joints_by_hand
@@ -138,7 +138,7 @@ def _humanoid(source: JointSource, by_hand: dict[str, str], skinned: np.ndarray)
     try:
         return find_humanoid(source.names, source.parents, source.bind[:, :3, 3], by_hand, skinned)
     except NeuralocksError as error:
-        raise type(error)(f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None
+        raise reworded(error, f"{source.path}: {str(error).removeprefix('skeleton: ')}") from None
 
 
 def _twice(source: JointSource, by_hand: dict[str, str], humanoid: Humanoid) -> list[str]:

@@ -27,6 +27,19 @@ def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
 
 
+def test_a_character_that_is_hidden_by_its_scale_is_told_in_one_line(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    model, stage = model_for(read_rigged_hair(shot)), Usd.Stage.Open(str(shot))
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Who")).AddScaleOp().Set(Gf.Vec3f(0))
+    stage.Save()
+    for read in (lambda: bake_rig(shot, tmp_path / "out.usda", model), lambda: read_rigged_hair(shot)):
+        with pytest.raises(
+            NeuralocksError, match="^/Who/Rig: the transform of /Who above it has zero scale; give it a scale"
+        ):
+            read()
+    assert not (tmp_path / "out.usda").exists()
+
+
 @pytest.mark.parametrize("bound", [True, False], ids=["to a missing prim", "to nothing"])
 def test_a_skeleton_without_an_animation_is_told_to_have_none(tmp_path, bound):
     """To name another joint with --head would not help."""
