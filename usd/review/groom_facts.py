@@ -10,6 +10,7 @@ from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
 
 from ..border.placement import Placement
 from ..border.units import Border
+from ..border.values import as_numbers
 from ..shot.attach import rig_joint
 from ..shot.curve_ends import groom_between, undrawn
 from ..shot.curves import rest_counts
@@ -102,9 +103,12 @@ def _unfit(prim) -> list[str]:
     if not codes:
         return [f"{prim.GetPath()}: its samples are hidden by a stronger layer; bake again"]
     code = codes[len(codes) // 2]
-    for attribute in (curves.GetPointsAttr(), curves.GetVelocitiesAttr()):
-        values = attribute.Get(code)
-        if values is not None and len(values) not in (0, count):
+    for attribute, kind in ((curves.GetPointsAttr(), "point3f[]"), (curves.GetVelocitiesAttr(), "vector3f[]")):
+        try:
+            values = as_numbers(attribute, kind, attribute.Get(code), np.float32)
+        except NeuralocksError as error:
+            return [str(error)]
+        if len(values) not in (0, count):
             fact = f"{len(values)} {attribute.GetName()} at time code {code:g} for curves of {count} points"
             return [f"{prim.GetPath()}: {fact}; bake again"]
     return []

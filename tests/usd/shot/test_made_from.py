@@ -129,6 +129,9 @@ def test_a_bake_under_another_groom_is_told(tmp_path, model):
     told = f'over "Hero"\n{{\n  over "Hair"\n  {{\n    point3f[] points = {[tuple(p) for p in points]}\n  }}\n}}\n'
     notes = inspect(over(tmp_path, "hides", "hair.usdc", more=told))["spoils"]
     assert "/Hero/Hair: its samples are hidden by a stronger layer; bake again" in notes
+    told = 'over "Hero"\n{\n  over "Hair"\n  {\n    float velocities = 1\n  }\n}\n'
+    notes = inspect(over(tmp_path, "odd", "hair.usdc", more=told))["spoils"]
+    assert "/Hero/Hair: its velocities are float, not vector3f[]; export it again with that type" in notes
     unfit = "/Hero/Hair: 480 points at time code 5 for curves of 360 points; bake again"
     assert unfit not in inspect(tmp_path / "hair.usdc")["spoils"]
     hair = stage.GetPrimAtPath("/Hero/Hair")
