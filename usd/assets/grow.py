@@ -13,7 +13,7 @@ from neuralocks_core.body.head_field import HeadField
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
-from neuralocks_core.groom import Groom
+from neuralocks_core.groom import LARGEST_COORDINATE, Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
 from neuralocks_core.hairstyles import grow as grow_style
 from neuralocks_core.hairstyles.fitting import Fitted, fit
@@ -84,6 +84,11 @@ class Barber:
     def __init__(self, character: Character):
         if character.body is None:
             raise NeuralocksError("character: hair needs a head to grow on; give a character with skin, or a groom")
+        if not (np.abs(character.body.points) <= LARGEST_COORDINATE).all():  # no groom could lie there
+            raise NeuralocksError(
+                f"character: its skin reaches farther than {LARGEST_COORDINATE:g} m from the origin; check metersPerUnit, and "
+                "scale and place of the skeleton and the prims above it"
+            )
         self.character = character
 
     def grow(self, style: str, count: int, seed: int, variation: int = 0, progress: Progress | None = None) -> Groom:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
@@ -19,7 +19,7 @@ from usd.models import training_scene as training_scene_module
 from usd.models.training_scene import training_scene
 from usd.shot.stage import read_rigs, read_shot
 
-from ..shots import HEAD, JOINTS, MOTION, Recipe, world_points, write_shot
+from ..shots import HEAD, JOINTS, MOTION, Recipe, edited, world_points, write_shot
 
 BODY = Path(__file__).resolve().parents[3] / "examples" / "shot" / "body.usdc"
 
@@ -34,6 +34,18 @@ def test_a_style_grows_on_the_head_and_is_repeatable(tmp_path):
     roots = points[0].reshape(60, -1, 3)[:, 0]
     centre = character.canonical_to_bind[:3, 3] + character.head_centre
     assert np.linalg.norm(roots - centre, axis=1).max() < 0.2
+
+
+def test_a_character_of_impossible_size_grows_no_hair(tmp_path):
+    def far_too_large(stage):
+        UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddScaleOp().Set(Gf.Vec3f(1e30))
+
+    shot = edited(tmp_path, far_too_large)
+    with pytest.raises(
+        NeuralocksError, match="^character: its skin reaches farther than 10000 m from the origin; check met"
+    ):
+        grow("bob", shot, tmp_path / "out.usda", count=12)
+    assert [path.name for path in tmp_path.iterdir()] == [shot.name]
 
 
 def test_a_training_may_learn_from_variations_of_each_style(tmp_path, monkeypatch):
