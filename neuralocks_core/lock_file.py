@@ -21,7 +21,7 @@ class FolderLock:
         busy: what messages say if another process is working in the folder.
 
     Raises:
-        NeuralocksError: the folder is locked by another process, is a link to somewhere else, or cannot be made.
+        NeuralocksError: the folder is locked by another process, it or its lock is a link to somewhere else, or it cannot be made.
     """
 
     def __init__(self, folder: Path, subject: Path, busy: str):
@@ -31,7 +31,12 @@ class FolderLock:
                 folder.mkdir(parents=True, exist_ok=True)
                 if folder.is_symlink():
                     raise NeuralocksError(f"{folder}: is a link, and files behind it would be removed; remove the link")
-                self._lock = _taken(folder / "lock")
+                lock = folder / "lock"
+                if (
+                    lock.is_symlink() or lock.exists() and not lock.is_file()
+                ):  # opening a link may make a file elsewhere
+                    raise NeuralocksError(f"{lock}: is not a plain file, as the lock of this folder is; remove it")
+                self._lock = _taken(lock)
                 if self._lock is not None:
                     return
         except BlockingIOError:

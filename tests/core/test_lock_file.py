@@ -3,6 +3,7 @@
 
 import pytest
 
+from neuralocks_core import lock_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.lock_file import FolderLock
 
@@ -41,12 +42,22 @@ def test_removed_while_it_is_opened(tmp_path, monkeypatch):
     second.release()
 
 
-def test_no_folder_can_be_made(tmp_path):
+def test_no_folder_can_be_made(tmp_path, monkeypatch):
     """The message names what the caller is doing."""
     (tmp_path / "file").touch()
     with pytest.raises(NeuralocksError, match="hair.usdc"):
         FolderLock(tmp_path / "file", tmp_path / "hair.usdc", "busy")
-    (tmp_path / "work").mkdir()
-    (tmp_path / "work" / "lock").symlink_to(tmp_path / "nowhere" / "lock")
+    monkeypatch.setattr(lock_file, "_taken", lambda path: None)  # others always remove it meanwhile
     with pytest.raises(NeuralocksError, match="busy"):
         FolderLock(tmp_path / "work", tmp_path / "work", "busy")
+
+
+@pytest.mark.parametrize("kind", ["folder", "link"])
+def test_what_is_no_lock_is_named(tmp_path, kind):
+    """A link would let a file be made wherever it leads."""
+    lock, elsewhere = tmp_path / "work" / "lock", tmp_path / "elsewhere"
+    lock.parent.mkdir()
+    lock.mkdir() if kind == "folder" else lock.symlink_to(elsewhere)
+    with pytest.raises(NeuralocksError, match=r"work.lock: is not a plain file, .*; remove it"):
+        FolderLock(lock.parent, tmp_path / "out.usda", "busy")
+    assert not elsewhere.exists()
