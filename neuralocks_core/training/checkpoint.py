@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -74,8 +73,7 @@ def load(
         NeuralocksError: it is damaged, or belongs to other settings.
     """
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        arrays = _read(path)
         meta = json.loads(arrays["meta"].tobytes())
         had = meta.get("settings", {}) if isinstance(meta, dict) else None
         if not isinstance(had, dict):
@@ -92,13 +90,26 @@ def load(
             module.load_state_dict({k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)})
         for place, optimiser in enumerate(optimisers):
             _fill(optimiser, {k: v for k, v in tensors.items() if k.startswith(f"optimiser/{place}/")})
-    except (OSError, ValueError, TypeError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
+    except (ValueError, TypeError, KeyError, RuntimeError) as error:
         # Errors of numpy, json and torch about damage are written for programmers.
         fact = error if isinstance(error, _Unfit) else "another network" if type(error) is RuntimeError else "damaged"
         raise NeuralocksError(
             f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"
         ) from None
     return meta
+
+
+def _read(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of a checkpoint, by name.
+
+    Raises:
+        ValueError: it is damaged, or there is none.
+    """
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except Exception:  # of numpy, zipfile and whatever unpacks: an array may also claim more than any memory holds
+        raise _Unfit("damaged") from None
 
 
 def _alike(value, like) -> bool:

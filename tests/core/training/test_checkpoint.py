@@ -2,6 +2,7 @@
 """Checkpoints: NaN is never kept, and whatever a damaged one holds is one line."""
 
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -97,3 +98,16 @@ def test_what_is_not_finite_does_not_take_the_place_of_what_is(tmp_path):
     with pytest.raises(NeuralocksError, match="c.npz: NaN or infinity in module/net/weight"):
         checkpoint.save(path, {"step": 2}, {"net": net}, optimisers)
     assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("shape", ["(10000000000000,)", "(99999999999999999999,)", "(-5,)"])
+def test_an_array_that_claims_an_impossible_size_is_one_line(tmp_path, shape):
+    net, path = torch.nn.Linear(3, 2), tmp_path / "checkpoint.npz"
+    checkpoint.save(path, {}, {"net": net})
+    with zipfile.ZipFile(path, "a") as archive:
+        header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}}}".ljust(117) + "\n"
+        archive.writestr("more.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode())
+    with pytest.raises(
+        NeuralocksError, match=r"checkpoint.npz: this checkpoint does not fit \(damaged\); train without"
+    ):
+        checkpoint.load(path, {"net": net})
