@@ -248,7 +248,9 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
     moved by no blend shape. Those of a trunk that stands still do not count: a grid around all of it takes seconds to build.
     """
     shift = turn = np.zeros(len(character.skeleton.names))
-    for joints in clip.joints:
+    for row, joints in enumerate(clip.joints):
+        if row and np.array_equal(joints, clip.joints[row - 1]):
+            continue
         off = character.skinning(joints) @ character.canonical_to_bind - np.eye(4)
         turn = np.maximum(turn, np.sqrt(np.square(off[:, :3, :3]).sum(axis=(1, 2))))
         shift = np.maximum(shift, np.linalg.norm(off[:, :3, 3], axis=1))

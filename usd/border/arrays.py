@@ -44,5 +44,5 @@ def wxyz(values: Vt.QuatfArray) -> np.ndarray:
     """Quaternions (J, 4) wxyz of a Vt.QuatfArray, whose buffer holds the imaginary part first."""
     raw = np.asarray(values)
     if raw.ndim == 2 and raw.shape[1] == 4:
-        return np.roll(raw.astype(float), 1, axis=1)
+        return raw[:, [3, 0, 1, 2]].astype(float)
     return np.array([(q.GetReal(), *q.GetImaginary()) for q in values], float)

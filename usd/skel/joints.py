@@ -105,11 +105,20 @@ class JointSource:
 
     def posed(self, time_codes) -> np.ndarray:
         """Joints (T, J, 4, 4) in stage world space at time codes (T,), as UsdSkel evaluates them."""
-        local = self.local(time_codes)
+        # A shot may go on for thousands of frames after its animation: a pose that is held is computed once.
+        codes, rows = np.unique(np.clip(time_codes, *self._keyed), return_inverse=True)
+        local = self.local(codes)
         for joint, parent in enumerate(self.parents):  # parents come first
             if parent >= 0:
                 local[:, joint] = local[:, parent] @ local[:, joint]
-        return np.stack([self.placement.at(t) for t in time_codes])[:, None] @ local
+        return np.stack([self.placement.at(t) for t in time_codes])[:, None] @ local[rows]
+
+    @cached_property
+    def _keyed(self) -> tuple[float, float]:
+        """First and last time code at which the animation has a sample of a joint: it holds its poses before and after."""
+        channels = () if self._columns is None else self._channels()
+        codes = [code for channel in channels for code in channel.GetTimeSamples()]
+        return (min(codes), max(codes)) if codes else (0.0, 0.0)
 
     @property
     def shape_names(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from pxr import Gf, Usd, UsdGeom, UsdSkel
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.runtime import StrandModel
 from usd.shot.stage import read_shot
+from usd.skel.joints import JointSource
 
 from ..shots import Recipe, write_shot
 
@@ -22,6 +23,32 @@ def test_a_pose_is_held_to_the_end_of_the_shot_where_the_animation_begins_before
     rig = read_shot(path).rigs[0]
     assert (rig.time_codes[0], rig.time_codes[-1]) == (1, 30)
     np.testing.assert_array_equal(rig.clip.joints[-1], rig.joints_at(9))
+
+
+def test_a_pose_that_is_held_for_long_is_computed_once(tmp_path, monkeypatch):
+    """A range of hundreds of frames around a short animation, in which the character's place still moves."""
+    path = write_shot(tmp_path, Recipe(frames=9))
+    stage = Usd.Stage.Open(str(path))
+    stage.SetStartTimeCode(-300)
+    stage.SetEndTimeCode(400)
+    place = UsdGeom.Xformable(stage.GetDefaultPrim()).AddTranslateOp(opSuffix="late")
+    for code in (12, 20):
+        place.Set((0.1 * code, 0, 0), code)
+    stage.Save()
+    read, local = [], JointSource.local
+
+    def counted(source, codes):
+        read.append(len(codes))
+        return local(source, codes)
+
+    monkeypatch.setattr(JointSource, "local", counted)
+    rig = read_shot(path).rigs[0]
+    assert len(rig.time_codes) == 701 and sum(read) < 50
+    for row, code in enumerate(rig.time_codes):
+        if code in (-300, 0, 1, 4, 9, 10, 12, 15, 20, 21, 400):
+            np.testing.assert_array_equal(rig.clip.joints[row], rig.joints_at(code))
+            one = rig.source.placement.at(code) @ local(rig.source, [code])[0, 0]
+            np.testing.assert_array_equal(rig.source.posed([code])[0, 0], one)
 
 
 @pytest.mark.parametrize("rate", [24.0, 60.0, 1000.0])
