@@ -15,6 +15,7 @@ from ..border.values import as_numbers
 from ..shot.made_from import baked_from_others
 from ..shot.recorded import recorded_cuts, recorded_joint, retimed
 from ..shot.stage import Shot, StageGroom, read_shot
+from ..skel.stage_rig import StageRig
 
 MOST_BODY_POINTS = 400_000
 """Largest number of body points drawn in a preview."""
@@ -31,11 +32,25 @@ class Baked:
 
     shot: Shot
     codes: np.ndarray = field(repr=False)
+    _joints: dict[str, np.ndarray] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _shapes: dict[str, np.ndarray] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def times(self) -> np.ndarray:
         """(T,) [s]."""
         return self.shot.border.seconds(self.codes)
+
+    def joints(self, rig: StageRig) -> np.ndarray:
+        """World joint transforms (T, J, 4, 4) [m] of a skeleton at all time codes, read once for all its grooms; do not modify them."""
+        if rig.path not in self._joints:
+            self._joints[rig.path] = np.stack([rig.joints_at(code) for code in self.codes])
+        return self._joints[rig.path]
+
+    def shapes(self, rig: StageRig) -> np.ndarray:
+        """The same for blend shape weights (T, B)."""
+        if rig.path not in self._shapes:
+            self._shapes[rig.path] = np.stack([rig.shape_at(code) for code in self.codes])
+        return self._shapes[rig.path]
 
     def alone(self, item: StageGroom) -> "Baked":
         """The same, only at one groom's own samples: between them its points move along chords, unlike hair."""
@@ -58,10 +73,12 @@ class Baked:
         points = points if item.beyond is None else points[item.beyond.hair]
         return transformed(points, self.shot.border.to_core @ item.placement.at(code))
 
-    def canonical(self, item: StageGroom, code: float) -> np.ndarray:
-        """The same in canonical space, where the rigidly carried groom stands still."""
-        joints = item.attachment.rig.joints_at(code)
-        return transformed(self.world(item, code), np.linalg.inv(item.attachment.character.canonical_to_world(joints)))
+    def canonical(self, item: StageGroom, frame: int) -> np.ndarray:
+        """The same at one of the time codes, in canonical space, where the rigidly carried groom stands still."""
+        joints = self.joints(item.attachment.rig)[frame]
+        return transformed(
+            self.world(item, self.codes[frame]), np.linalg.inv(item.attachment.character.canonical_to_world(joints))
+        )
 
     def scene(self) -> Scene:
         """All grooms of the first groom's skeleton and its body, for a preview."""

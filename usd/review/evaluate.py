@@ -12,8 +12,10 @@ from neuralocks_core.runtime import StrandModel
 
 from ..border.damage import names_damage
 from ..shot.recorded import recorded_material
+from ..shot.stage import StageGroom
 from .baked import Baked, read_baked
-from .subject import Subject
+from .depths import depths
+from .subject import STRANDS, Subject
 
 
 @names_damage
@@ -48,31 +50,55 @@ def evaluate(
     say = progress or silent
     measured, compared, curves = {}, {}, {}
     notes = list(baked.shot.notes)
-    each = {item.path: baked.alone(item) for item in baked.shot.grooms}
-    if min(len(own.codes) for own in each.values()) < 3:
+    groups, count, begin = _together(baked), len(baked.shot.grooms), 0
+    if min(len(own.codes) for own, _ in groups) < 3:
         notes.append("fewer than three frames: motion is neither measured nor compared")
-    for number, item in enumerate(baked.shot.grooms, 1):
-        own = each[item.path]
-        subject = Subject(own, item, _numbered(say, number, len(each)))
-        look = material or recorded_material(item.prim) or Material()
-        measured[item.path] = subject.measures(look)
-        if not len(subject.chosen):
-            notes.append(f"{item.path}: no strand has two distinct points; nothing is measured")
-            continue
-        curves[item.path] = {"times": own.times, "bake": metrics.tip_curves(subject.moved)}
-        curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
-        if reference and len(own.codes) >= 3:
-            rows, tips = subject.compared(look, beside)
-            compared[item.path] = rows
-            curves[item.path] |= tips
+    for own, items in groups:
+        subjects = [
+            Subject(own, item, _numbered(say, number, number, count)) for number, item in enumerate(items, begin + 1)
+        ]
+        deep = depths(subjects, _numbered(say, begin + 1, begin + len(items), count))
+        begin += len(items)
+        for subject, inside in zip(subjects, deep, strict=True):
+            item = subject.item
+            look = material or recorded_material(item.prim) or Material()
+            measured[item.path] = subject.measures(look, inside)
+            if not len(subject.chosen):
+                notes.append(f"{item.path}: no strand has two distinct points; nothing is measured")
+                continue
+            curves[item.path] = {"times": own.times, "bake": metrics.tip_curves(subject.moved)}
+            curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
+            if reference and len(own.codes) >= 3:
+                rows, tips = subject.compared(look, beside)
+                compared[item.path] = rows
+                curves[item.path] |= tips
     return Card(str(baked.shot.path), measured, compared, curves, tuple(notes))
 
 
-def _numbered(say: Progress, number: int, count: int) -> Progress:
-    """Progress of one of several grooms, each of which begins anew: share and time left are of that one's step."""
+def _together(baked: Baked) -> list[tuple[Baked, list[StageGroom]]]:
+    """The grooms in their order; successive ones of one head, sampled at the same time codes, together as long as no more strands
+    of them are measured than of a large one.
+    """
+    found: list[tuple[Baked, list[StageGroom]]] = []
+    strands = 0
+    for item in baked.shot.grooms:
+        own, few = baked.alone(item), min(item.groom.strand_count, STRANDS)
+        strands += few
+        if found and strands <= STRANDS and np.array_equal(found[-1][0].codes, own.codes):
+            if found[-1][1][0].attachment.character is item.attachment.character:
+                found[-1][1].append(item)
+                continue
+        found.append((own, [item]))
+        strands = few
+    return found
+
+
+def _numbered(say: Progress, first: int, last: int, count: int) -> Progress:
+    """Progress of one or more of several grooms, each of which begins anew: share and time left are of that one's step."""
     if count == 1:
         return say
-    return lambda done, total, message="": say(done, total, f"groom {number} of {count}: {message}")
+    which = f"groom {first}" if first == last else f"grooms {first} to {last}"
+    return lambda done, total, message="": say(done, total, f"{which} of {count}: {message}")
 
 
 def _model_beside(given) -> StrandModel | None:

@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is measured of one groom of a bake, and of the same strands simulated."""
 
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from neuralocks_core import metrics
-from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.evaluation import comparison
@@ -17,7 +14,7 @@ from neuralocks_core.evaluation.pose_energies import energies, stretch_energy
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import GRAVITY, Clip, G
 from neuralocks_core.network_sizes import K
-from neuralocks_core.runtime import StrandModel, cores
+from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.centreline import passes, smoothed
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, strands_on
@@ -35,8 +32,8 @@ REFERENCE_STRANDS = 200
 WOUND = 1.2
 """A strand this many times as long as the line of its network vertices is a coil. If it only has a kink, its points show the line's
 motion better than smoothed ones would."""
-COLLISION_FRAMES, DEEPEST_FRAMES = 32, 3
-"""Frames in which distances to the body are measured: the former evenly over the bake, the latter where hair seems deepest."""
+TURN_FRAMES = 32
+"""Angles between edges are measured in about this many frames."""
 COLLISION_VERTICES, COLLISION_POINTS = 200_000, 6_400_000
 """Most of the groom's own vertices that are measured, evenly along the strands, and most positions of them in all frames."""
 
@@ -49,12 +46,12 @@ class Subject:
         self.character, groom = item.attachment.character, item.groom
         every = strands_on(self.character, groom)
         rig = item.attachment.rig
-        skin, shapes = RootSkin(self.character, [every], rig.clip), [rig.shape_at(code) for code in baked.codes]
+        skin, shapes = RootSkin(self.character, [every], rig.clip), baked.shapes(rig)
         begun = skin.begun(every)
         # The solver moves the strands that seed 0 chooses; another seed also measures strands that follow them.
         self.chosen = every.whole_locks(STRANDS, seed=int("solver" in recorded(item.prim)))
         self.strands: StrandSet = every.subset(self.chosen)
-        self._begun = begun.subset(self.chosen)
+        self.begun = begun.subset(self.chosen)
         self.valid = int(every.valid.sum())
         arc, length = arc_lengths(groom)
         self._within(groom, arc, length)
@@ -70,8 +67,8 @@ class Subject:
         self.bends = OwnBends(groom, self.chosen, arc, rest, total)
         sums, taut = [], []
         edges_at_rest = self._edge_lengths(rest)
-        for frame, code in enumerate(baked.codes):
-            points = baked.canonical(item, code)
+        for frame in range(total):
+            points = baked.canonical(item, frame)
             sums.append(metrics.stretch(metrics.strand_lengths(points, groom.counts)[None], rest_lengths))
             taut.append(stretch_energy(self._edge_lengths(points)[None], edges_at_rest)[0])
             offset = points - rest
@@ -116,18 +113,17 @@ class Subject:
         """Lengths (E,) of the chosen strands' own edges [m]; points (P, 3) of the whole groom."""
         return np.linalg.norm(points[self._edges + 1] - points[self._edges], axis=1)
 
-    def measures(self, material: Material) -> dict:
-        """Everything that needs no reference; for a groom without hair, only the counts."""
+    def measures(self, material: Material, depths: dict) -> dict:
+        """Everything that needs no reference, with its `depths`; for a groom without hair, only the counts."""
         baked, times = self.baked, self.baked.times
         result = {"strands": self.item.groom.strand_count, "measured": len(self.chosen), "frames": len(baked.codes)}
         if not len(self.chosen):
             return result
         strands, length = self.strands, np.maximum(self.strands.length, 1e-6)
-        rig = self.item.attachment.rig
-        joints = np.stack([rig.joints_at(code) for code in baked.codes])
+        joints = baked.joints(self.item.attachment.rig)
         turn = self.character.canonical_to_world(joints)[:, :3, :3]
         down = np.einsum("tji,j->ti", turn / np.cbrt(np.linalg.det(turn))[:, None, None], GRAVITY / G)
-        result |= {**self.stretch, **self._penetration(), "droop_cm": metrics.droop(self.moved, down)}
+        result |= {**self.stretch, **depths, "droop_cm": metrics.droop(self.moved, down)}
         if len(times) >= 3:
             tips = self.moved[:, :, -1] - self.moved[:, :, -1].mean(axis=0)
             swing = np.sqrt(np.square(tips).sum(axis=2).mean(axis=0)) / length
@@ -135,45 +131,13 @@ class Subject:
             result["speed_cm_s"] = 100 * float(speed.mean()) if len(speed) else float("nan")
             result["swing_percent"] = 100 * float(swing.mean())
             result |= self._stops(joints)
-        result["turn_degrees"] = metrics.turning(strands.rest + self.moved[:: max(1, len(times) // COLLISION_FRAMES)])
+        result["turn_degrees"] = metrics.turning(strands.rest + self.moved[:: max(1, len(times) // TURN_FRAMES)])
         result["turn_at_rest_degrees"] = metrics.turning(strands.rest)
         sums = energies(strands.rest + self.moved, strands.rest, down, material)
         result |= {f"energy_{name}": float(np.mean(value)) for name, value in sums.items()}
         if not self.bends.fine.all():
             result["energy_bend"] = self.bends.energy(self.moved, strands.rest, material)
         return result | {"energy_stretch": self.stretch_energy}
-
-    def _penetration(self) -> dict:
-        resolver = self._resolver
-        if resolver.at_rest is None or not len(self._own):
-            return {}
-        resolver.prepare()
-        rig, baked = self.item.attachment.rig, self.baked
-        at_rest = resolver.at_rest.distance(self.own_rest, limit=0.005)[0]
-        every = np.arange(len(baked.codes))
-        joints, shapes = ([at(code) for code in baked.codes] for at in (rig.joints_at, rig.shape_at))
-
-        def roughly(frame: int) -> float:
-            distance = resolver.rough_distance(self.own[frame], joints[frame], shapes[frame])
-            return float(np.min(distance - np.minimum(at_rest, 0)))
-
-        def measured(frame: int) -> np.ndarray:
-            return resolver.collider(joints[frame], shapes[frame]).distance(self.own[frame], limit=0.005)[0]
-
-        with ThreadPoolExecutor(cores()) as pool:
-
-            def told(function, frames: np.ndarray) -> Iterator:
-                for number, each in enumerate(pool.map(function, frames)):
-                    self.say(number + 1, len(frames), "measuring distances to the body")
-                    yield each
-
-            even = every[np.linspace(0, len(every) - 1, min(len(every), COLLISION_FRAMES)).round().astype(int)]
-            deepest = np.argsort(list(told(roughly, every)), kind="stable")[:DEEPEST_FRAMES]
-            frames = np.concatenate([even, np.setdiff1d(deepest, even)])
-            distance = np.stack(list(told(measured, frames)))
-        worst = metrics.penetration(distance, at_rest)["penetration_worst_mm"]
-        shares = metrics.penetration(distance[: len(even)], at_rest)
-        return shares | {"penetration_worst_mm": worst, "penetration_frames": len(even)}
 
     def _stops(self, joints) -> dict:
         """Settling after the longest stop, and what still moves once it should be over."""
@@ -197,7 +161,7 @@ class Subject:
         """Rows and tip curves compared with the reference."""
         strands, times = self.strands, self.baked.times
         few = strands.whole_locks(REFERENCE_STRANDS)
-        some = self._begun.subset(few)
+        some = self.begun.subset(few)
         clip = self._clip
         # The network knows what came before the first frame baked, so the reference must, too.
         begun = times[0] - comparison.RUN_IN
@@ -240,7 +204,3 @@ class Subject:
     def _cuts(self) -> np.ndarray:
         """When hair starts anew (C,) [s]."""
         return np.array([part.start for part in self._clip.parts[1:]])
-
-    @cached_property
-    def _resolver(self) -> Resolver:
-        return Resolver(self.character, self._begun, self.item.attachment.rig.clip)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Grooms of one head are posed together, and each comes out as if it were alone."""
 
+from dataclasses import replace
 from unittest.mock import Mock
 
 import numpy as np
@@ -10,7 +11,10 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 import usd.baking.batches as batches
 import usd.shot.hair_search as hair_search
 import usd.shot.stage as stage_reading
+from neuralocks_core.deformation.resolve import Resolver
 from usd.baking.bake import bake
+from usd.review.baked import read_baked
+from usd.review.evaluate import evaluate
 from usd.shot.stage import read_shot
 
 from ..shots import Recipe, samples, write_shot
@@ -102,3 +106,20 @@ def test_an_interrupted_bake_goes_on(shot, tmp_path, model):
         bake(shot, out, model, progress=stop)
     assert bake(shot, out, model).resumed == 9
     assert out.read_bytes() == whole
+
+
+def test_a_report_poses_the_body_once_for_all_of_a_head(shot, model, tmp_path, monkeypatch):
+    stage = Usd.Stage.Open(str(shot))
+    for name in "DE":
+        Sdf.CopySpec(stage.GetRootLayer(), "/Hero/B", stage.GetRootLayer(), f"/Hero/{name}")
+    stage.Save()
+    baked = read_baked(bake(shot, tmp_path / "hair.usdc", model, velocities=False).path)
+    collider = Mock(side_effect=Resolver.collider)
+    monkeypatch.setattr(Resolver, "collider", lambda *args: collider(*args))
+    together = evaluate(baked)
+    assert [path[-1] for path in together.grooms] == ["A", "B", "C", "e", "D", "E"]
+    resolvers = {id(call.args[0]) for call in collider.mock_calls}
+    assert len(resolvers) < 6 and collider.call_count == len(resolvers) * len(baked.codes)
+    for item in baked.shot.grooms:
+        alone = evaluate(replace(baked, shot=replace(baked.shot, grooms=(item,))))
+        np.testing.assert_equal(alone.grooms[item.path], together.grooms[item.path])

@@ -186,14 +186,14 @@ def test_each_groom_is_measured_at_its_own_samples(tmp_path, model):
 
 
 def test_of_several_grooms_progress_says_which_is_measured(tmp_path, model):
-    """Share and time left begin anew with each."""
+    """Share and time left begin anew with each, and with what is measured of both together."""
     stage = Usd.Stage.Open(str(write_shot(tmp_path)))
     Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Brows")
     stage.GetRootLayer().Save()
     bake(tmp_path / "shot.usda", tmp_path / "both.usda", model, frames="1:3")
     said = []
     evaluate(tmp_path / "both.usda", progress=lambda done, total, message: said.append(message))
-    assert {message.partition(":")[0] for message in said} == {"groom 1 of 2", "groom 2 of 2"}
+    assert {message.partition(":")[0] for message in said} == {"groom 1 of 2", "groom 2 of 2", "grooms 1 to 2 of 2"}
     said.clear()
     evaluate(tmp_path / "both.usda", grooms=["/Hero/Brows"], progress=lambda done, total, message: said.append(message))
     assert said and not any("groom" in message for message in said)
