@@ -19,7 +19,7 @@ _AT_ONCE = 4
 """Rows of a layer that are summed at a time."""
 _WIDTH = 8
 """Columns of a layer are a multiple of this, the width of vector units."""
-HISTORY_BYTES = 10_304
+HISTORY_BYTES = 10_816
 """Size of the struct of history.h.in; a dynamic model needs one per character."""
 MADE = "Made by `neuralocks rig export-c`"
 """Text in the first lines of both files."""
