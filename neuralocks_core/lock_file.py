@@ -32,9 +32,8 @@ class FolderLock:
                 if folder.is_symlink():
                     raise NeuralocksError(f"{folder}: is a link, and files behind it would be removed; remove the link")
                 lock = folder / "lock"
-                if (
-                    lock.is_symlink() or lock.exists() and not lock.is_file()
-                ):  # opening a link may make a file elsewhere
+                # Opening a link may make a file elsewhere.
+                if lock.is_symlink() or lock.exists() and not lock.is_file():
                     raise NeuralocksError(f"{lock}: is not a plain file, as the lock of this folder is; remove it")
                 self._lock = _taken(lock)
                 if self._lock is not None:

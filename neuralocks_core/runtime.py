@@ -251,9 +251,8 @@ def graph_session(file: model_file.ModelFile, name: str):
     options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
     options.enable_cpu_mem_arena = False  # it keeps 13 MB in two threads, and saves at most a hundredth of the time
     options.log_severity_level = 4  # errors are raised anyway
-    options.add_session_config_entry(
-        "session.load_model_format", "ONNX"
-    )  # not its own format, which `odd_part` cannot read
+    # Not its own format, which `odd_part` cannot read.
+    options.add_session_config_entry("session.load_model_format", "ONNX")
     try:
         return onnxruntime.InferenceSession(file.graphs[name], options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises its own bare types for all errors in a graph
