@@ -10,6 +10,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.model import SUFFIX
 from neuralocks_core.training.work import abandon, reserve
 
 from ..live import refresh
@@ -262,7 +263,7 @@ def _reserved(name: str) -> str:
         else Path(bpy.utils.user_resource("DATAFILES", path="neuralocks", create=True))
     )
     number = 1
-    while not reserve(out := folder / f"{label}_{number}.neuralocks"):
+    while not reserve(out := folder / f"{label}_{number}{SUFFIX}"):
         number += 1
     return str(out)
 

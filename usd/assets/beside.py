@@ -10,7 +10,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade
 from neuralocks_core import rest_copy
 from neuralocks_core.groom import Groom
 
-from ..skel.surface import ever_visible, rest_primvar
+from ..skel.binding import rest_primvar
+from ..skel.surface import ever_visible
 
 KNOWN = ("st", "displayColor", "displayOpacity")
 """Primvars that are kept whatever their type, besides all whose names begin with `groom_`."""

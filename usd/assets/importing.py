@@ -22,8 +22,8 @@ from ..border.units import Border
 from ..shot.curves import find_curves, read_groom
 from ..shot.notes import few, first_of, unlikely_head
 from ..shot.stage import read_rigs
+from ..skel.binding import bound_skeleton, geom_bind
 from ..skel.stage_rig import StageRig
-from ..skel.surface import bound_skeleton, geom_bind
 from .beside import Beside, Primvar, read_beside
 from .groom import Authored, Over, write_grooms
 from .grow import Barber

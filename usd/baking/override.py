@@ -18,7 +18,7 @@ from ..shot.curves import rest_points, widest_sample
 from ..shot.made_from import INPUTS, made_from
 from ..shot.recorded import record
 from ..shot.stage import Shot, StageGroom
-from ..skel.surface import FORMER
+from ..skel.binding import FORMER
 from .header import apply_binding, over_prim, write_header
 from .sample_layer import SampleLayer
 from .spool import Spool

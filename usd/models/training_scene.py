@@ -31,9 +31,9 @@ from ..shot.notes import few, first_of, unfound, unlikely_head, without_turn
 from ..shot.rig_controls import is_closed
 from ..shot.skeletons import read_each_rig
 from ..shot.stage import read_rigs
+from ..skel.binding import bound_skeleton
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
-from ..skel.surface import bound_skeleton
 
 LIBRARY = "library"
 """A groom of this name stands for every style of the procedural library, grown on the character."""

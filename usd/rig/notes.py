@@ -10,8 +10,8 @@ from neuralocks_core.rig.network import rig_spec
 
 from ..shot.character_notes import lies_down
 from ..shot.notes import another_head, unfound, unlikely_head
+from ..skel.binding import rest_primvar
 from ..skel.stage_rig import StageRig
-from ..skel.surface import rest_primvar
 from .facing import facing_notes
 from .outside import left_out_notes, outside_notes
 from .stage import RiggedHair, core_meshes

@@ -16,8 +16,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement
+from ..skel.binding import bound_skeleton, geom_bind, joint_influences
 from ..skel.stage_rig import StageRig
-from ..skel.surface import bound_skeleton, geom_bind, joint_influences
 from .alike import one_of_alike
 from .carrying import carried_by, carrying_joint, followed_joint, head_by_name, joint_shares, spread_over
 from .curve_ends import beyond_ends, ends

@@ -17,8 +17,9 @@ from neuralocks_core.rotation import transformed
 
 from ..border.arrays import column_matrix
 from ..border.values import as_numbers
+from ..skel.binding import bound_skeleton
 from ..skel.stage_rig import StageRig
-from ..skel.surface import bound_skeleton, drawn
+from ..skel.surface import drawn
 from .notes import unlikely_head
 from .seat import beginnings
 from .whole_body import parts_elsewhere

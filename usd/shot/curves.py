@@ -13,7 +13,7 @@ from neuralocks_core.rotation import transformed
 
 from ..border.prim_paths import prim_paths
 from ..border.values import as_numbers
-from ..skel.surface import rest_primvar, rest_value
+from ..skel.binding import rest_primvar, rest_value
 
 
 def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:

@@ -11,8 +11,8 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 
 from ..border.placement import Placement, Unplaced
+from ..skel.binding import bound_skeleton
 from ..skel.stage_rig import StageRig
-from ..skel.surface import bound_skeleton
 from .attach import Attachment, attach, of_another, off_head, rig_joint
 from .character_notes import unevenly_scaled, untrained
 from .curve_ends import undrawn

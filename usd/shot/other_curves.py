@@ -11,8 +11,8 @@ from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement, Unplaced
 from ..border.values import as_numbers
+from ..skel.binding import rest_value
 from ..skel.stage_rig import StageRig
-from ..skel.surface import rest_value
 from .attach import REACH
 from .seat import NEAR, ways
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pxr import Usd, UsdGeom
 
 from ..border.placement import Placement
+from ..skel.binding import bound_skeleton
 from ..skel.stage_rig import StageRig
-from ..skel.surface import bound_skeleton
 from .curves import rest_counts
 from .seat import NEAR, find_seat
 

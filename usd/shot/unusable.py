@@ -17,9 +17,10 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement
 from ..border.units import Border
 from ..border.values import as_names, as_numbers
+from ..skel.binding import geom_bind, rest_value
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
-from ..skel.surface import drawn, find_skins, geom_bind, rest_value
+from ..skel.surface import drawn, find_skins
 from .attach import ALIKE, Attachment, on_head
 from .seat import NEAR, either_ends, kinship, off_skin
 

@@ -16,7 +16,7 @@ from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair
 from usd.shot.stage import read_shot
-from usd.skel.surface import FORMER
+from usd.skel.binding import FORMER
 
 from ..rig_shots import model_for, small_shot
 from ..shots import CENTRE, HEAD, Recipe, samples, strand_points, world_points, write_shot

@@ -10,7 +10,7 @@ from usd.review.baked import read_baked
 from usd.review.inspect import inspect
 from usd.shot.curves import rest_points
 from usd.shot.stage import read_rigs, read_shot
-from usd.skel.surface import bound_skeleton
+from usd.skel.binding import bound_skeleton
 
 from ..shots import CENTRE, HEAD, JOINTS, Recipe, samples, write_shot
 
