@@ -115,9 +115,7 @@ def _hair(armature, item, up, strands):
     if strands and strands < groom.strand_count:
         groom = groom.subset(np.linspace(0, groom.strand_count - 1, strands).astype(int))
     points = (groom.points @ up[:3, :3].T).astype(np.float32)
-    # Slightly wider than a real hair, since there are fewer strands than on a head.
-    radii = np.concatenate([np.linspace(4e-4, 1.4e-4, n) for n in groom.counts]).astype(np.float32)
-    data = curves.create("Hair", groom.counts, points, radii, _hair_material())
+    data = curves.create("Hair", groom.counts, points, groom.widths / 2, _hair_material())
     hair = bpy.data.objects.new("Hair", data)
     bpy.context.scene.collection.objects.link(hair)
     hair.parent = armature

@@ -44,11 +44,17 @@ def test_a_style_stands_on_the_scalp_and_clear_of_the_body(style):
     assert 0.002 < length.sum(axis=1).min()
     assert length.sum(axis=1).max() < 0.8
     assert strand_set(groom, CENTRE - [0, 0.06, 0], [0, 0.06, 0]).valid.all()
-    # Tips taper, and no strand is wider than a hair.
-    widths = groom.widths.reshape(400, -1)
-    assert (np.diff(widths, axis=1) < 0).all()
-    assert widths.max() < 1.01e-4
+    assert (np.diff(groom.widths.reshape(400, -1), axis=1) < 0).all()  # tips taper
     assert 1 <= groom.guides.sum() <= 400
+
+
+def test_few_strands_cover_the_head_as_many_hairs_do():
+    """At the width of a hair, the 3,200 strands of the shipped shot left the scalp bare in Cycles."""
+    size = SCALP.radius / 0.1
+    widest = {count: grow("bob", SCALP, count, body=OBSTACLE).widths.max() for count in (50, 1600, 6400)}
+    assert widest[6400] == pytest.approx(size * 9e-5 * np.sqrt(100_000 / 6400), rel=1e-4)
+    assert widest[1600] == pytest.approx(2 * widest[6400], rel=1e-4)
+    assert widest[50] == pytest.approx(size * 9e-4, rel=1e-4)
 
 
 @pytest.mark.parametrize("style", ["long_straight", "coils", "braid"])
