@@ -91,6 +91,19 @@ def replace_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
         raise cannot_write(path, error) from None
 
 
+def read_npz(path: Path) -> dict[str, np.ndarray]:
+    """The arrays that `replace_npz` wrote, by name.
+
+    Raises:
+        ValueError: the file is damaged, or there is none.
+    """
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except Exception:  # of numpy, zipfile and whatever unpacks: an array may also claim more than any memory holds
+        raise ValueError("damaged") from None
+
+
 @contextmanager
 def own_folder(parent: Path) -> Iterator[Path]:
     """A new hidden folder, removed with all its content at the end. Unlike one of `tempfile`, whose private rights on Windows stay

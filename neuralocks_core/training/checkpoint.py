@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import replace_npz
+from neuralocks_core.files import read_npz, replace_npz
 
 KEPT = {
     "Adam": {"step", "exp_avg", "exp_avg_sq"},
@@ -73,7 +73,7 @@ def load(
         NeuralocksError: it is damaged, or belongs to other settings.
     """
     try:
-        arrays = _read(path)
+        arrays = read_npz(path)
         meta = json.loads(arrays["meta"].tobytes())
         had = meta.get("settings", {}) if isinstance(meta, dict) else None
         if not isinstance(had, dict):
@@ -97,19 +97,6 @@ def load(
             f"{path}: this checkpoint does not fit ({fact}); train without --resume, or with the settings it began with"
         ) from None
     return meta
-
-
-def _read(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of a checkpoint, by name.
-
-    Raises:
-        ValueError: it is damaged, or there is none.
-    """
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except Exception:  # of numpy, zipfile and whatever unpacks: an array may also claim more than any memory holds
-        raise _Unfit("damaged") from None
 
 
 def _alike(value, like) -> bool:

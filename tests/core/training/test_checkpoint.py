@@ -10,7 +10,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from neuralocks_core.errors import NeuralocksError  # noqa: E402
-from neuralocks_core.training import checkpoint  # noqa: E402
+from neuralocks_core.training import checkpoint, farm  # noqa: E402
 from neuralocks_core.training.muon import muon  # noqa: E402
 
 NAN = np.float32(np.nan)
@@ -111,3 +111,5 @@ def test_an_array_that_claims_an_impossible_size_is_one_line(tmp_path, shape):
         NeuralocksError, match=r"checkpoint.npz: this checkpoint does not fit \(damaged\); train without"
     ):
         checkpoint.load(path, {"net": net})
+    with pytest.raises(NeuralocksError, match="checkpoint.npz: this simulation cannot be read; delete it"):
+        farm.load(path)
