@@ -203,11 +203,11 @@ def test_what_was_trained_is_not_lost_to_a_wrong_word(tmp_path):
     assert (work / "checkpoint.npz").read_bytes() == b"hours"
 
 
-def test_a_training_goes_on_where_the_model_was(tmp_path):
+def test_a_training_goes_on_where_the_model_was(few, tmp_path):
     """Without a step it is as good as the model; killed, it does not need the model's file; its card tells both."""
     scene = TrainingScene(person(), (straight_hair(),), frames=40, strands=8)
     first = RegressionOptions(steps=60, clips=16, strands=6, rate=4e-3)
-    path = train_strands(scene, tmp_path / "a.neuralocks", first, rollouts=24, credits=("Hair: Rapunzel.",))
+    path = train_strands(scene, tmp_path / "a.neuralocks", first, rollouts=4, credits=("Hair: Rapunzel.",))
     still = RegressionOptions(steps=1, clips=2, strands=2, rate=0.0)
     begun = train_strands(scene, tmp_path / "b.neuralocks", still, rollouts=4, begin=path, credits=("Motion: none.",))
     before, after = (model.read(p).meta for p in (path, begun))

@@ -34,13 +34,6 @@ def scene():
     return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
 
 
-@pytest.fixture
-def few(monkeypatch):
-    """Trainings begin after four simulations, and are measured on two."""
-    monkeypatch.setattr(methods, "FIRST", 4)
-    monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
-
-
 def test_a_rollout_depends_on_its_number_alone(scene, tmp_path):
     one, two = RolloutMaker(scene).make(3), RolloutMaker(scene).make(3)
     save(tmp_path / "r.npz", two)
