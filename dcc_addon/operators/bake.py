@@ -139,7 +139,8 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
     written: dict[str, str] = {}
     with undone_on_failure(*outs, *map(shot_beside, outs)):
         for number, (out, look, names) in enumerate(groups):
-            shot, begin, end = shot_beside(out), *(0.5 + 0.5 * (number + done) / len(looks) for done in (0, 1))
+            shot = shot_beside(out)
+            begin, end = (0.5 + 0.5 * (number + done) / len(looks) for done in (0, 1))
             own = [named(name) for name in names]
             prims = yield from write_shot(shot, named(character), scene, sampled, own, undrawn, begin)
             job = Threaded(

@@ -32,14 +32,13 @@ class Unkeyed:
 
     def put_back(self) -> None:
         """Restore the values that have changed since."""
-        own = {kind: _own_of(kind) for kind in {kind for kind, *_ in self._others}}
+        own = {kind: _own_of(kind) for kind in {"objects", *(kind for kind, *_ in self._others)}}
         for kind, name, within, path, value in self._others:
             owner = _owner(own[kind].get(name), within)
             if owner is not None and value_of(owner, path) not in (None, value):
                 _write(owner, path, value)
-        things = _own_of("objects")
         for name, kept in self._kept.items():
-            thing = things.get(name)
+            thing = own["objects"].get(name)
             if thing is None:
                 continue
             now = _channels(thing)

@@ -249,7 +249,7 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
     """
     shift = turn = np.zeros(len(character.skeleton.names))
     for row, joints in enumerate(clip.joints):
-        if row and np.array_equal(joints, clip.joints[row - 1]):
+        if row and np.array_equal(joints, clip.joints[row - 1]):  # shots go on for long after an animation
             continue
         off = character.skinning(joints) @ character.canonical_to_bind - np.eye(4)
         turn = np.maximum(turn, np.sqrt(np.square(off[:, :3, :3]).sum(axis=(1, 2))))

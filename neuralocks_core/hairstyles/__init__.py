@@ -42,8 +42,8 @@ def grow(
     variation: int = 0,
     progress: Progress | None = None,
 ) -> Groom:
-    """Grow a hairstyle. Strands taper to 0.55 of their width at the root, which is 0.09 mm on a head of 100,000; fewer strands are wider,
-    by the root of their number.
+    """Grow a hairstyle. On a scalp of 0.1 m radius, 100,000 strands are 0.09 mm wide at the root and 0.05 mm at the tip. Fewer are
+    wider, by the square root of how many times fewer, up to ten times; and width goes with the scalp's radius.
 
     Args:
         style: one of `STYLES`.

@@ -193,14 +193,15 @@ class Film:
     def _dress(self) -> np.ndarray:
         """Skin above the collar, dark cloth below, and mesh hair: linear RGB (V, 3)."""
         scene = self.scene
-        collar = scene.centre[1] - COLLAR
-        if scene.collar is not None:  # a child's head is nearer to its shoulders, a large one farther from its neck
-            collar = min(max(collar, scene.collar[0]), scene.collar[1])
-        below = collar - scene.body_rest[:, 1]
-        if scene.collar is not None:
+        height, collar = scene.body_rest[:, 1], scene.centre[1] - COLLAR
+        if scene.collar is None:
+            below = collar - height
+        else:
+            shoulder, neck, apart = scene.collar
+            # A child's head is nearer to its shoulders, a large one farther from its neck.
+            below = min(max(collar, shoulder), neck) - height
             aside = np.abs((scene.body_rest - scene.centre) @ scene.facing[0])
-            arms = scene.body_rest[:, 1] < scene.collar[1]  # a head may be wider
-            below = np.where(arms, np.maximum(below, aside - SLEEVES * scene.collar[2]), below)
+            below = np.where(height < neck, np.maximum(below, aside - SLEEVES * apart), below)  # a head may be wider
         cloth = np.clip(below / 0.03, 0, 1)[:, None]
         result = (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
         if scene.mesh_hair is not None:

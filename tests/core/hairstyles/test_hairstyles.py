@@ -44,7 +44,10 @@ def test_a_style_stands_on_the_scalp_and_clear_of_the_body(style):
     assert 0.002 < length.sum(axis=1).min()
     assert length.sum(axis=1).max() < 0.8
     assert strand_set(groom, CENTRE - [0, 0.06, 0], [0, 0.06, 0]).valid.all()
-    assert (np.diff(groom.widths.reshape(400, -1), axis=1) < 0).all()  # tips taper
+    # Tips taper, and no strand is wider than ten hairs.
+    widths = groom.widths.reshape(400, -1)
+    assert (np.diff(widths, axis=1) < 0).all()
+    assert widths.max() < 1.01e-3 * SCALP.radius / 0.1
     assert 1 <= groom.guides.sum() <= 400
 
 
