@@ -81,7 +81,8 @@ def render(
         images = film.shoot(chosen, seen_from, lambda done: say(done, len(chosen), f"drawing {path.name}"))
         with closing(images):
             if still:
-                _strip(part, images, [name(time) for time in scene.times[chosen]])
+                aside = [f", {angle:.0f}°" if turntable else "" for angle in seen_from]
+                _strip(part, images, [name(time) + from_there for time, from_there in zip(scene.times[chosen], aside)])
             else:
                 _CLIPS[kind](part, images, len(chosen), rate)
             say(len(chosen), len(chosen), f"writing {path.name}")  # the last moment at which a caller may stop it

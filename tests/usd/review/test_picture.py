@@ -63,6 +63,14 @@ def test_a_strip_shows_the_frames_asked_for_and_names_them(hair, tmp_path, monke
     assert named == [f"frame {frame:g}" for frame in shown]
 
 
+def test_a_strip_of_a_turntable_names_the_side_as_well(hair, tmp_path, monkeypatch):
+    """Round a single frame, that alone tells its pictures apart."""
+    named = []
+    monkeypatch.setattr(picture.drawing, "_strip", lambda part, images, names: (named.extend(names), part.touch()))
+    picture.preview(hair, tmp_path / "hair.png", frames="6", turntable=True, view=-30, size=(32, 40))
+    assert named == [f"frame 6, {angle}°" for angle in (-30, 30, 90, 150, 210, 270)]
+
+
 def test_a_turntable_goes_once_round_a_single_frame_and_shows_other_sides(hair, tmp_path):
     from PIL import Image
 
