@@ -26,9 +26,9 @@ class SpringSettings:
         gravity_power: pull downwards [m/s].
     """
 
-    stiffness: float = 1.0
-    drag: float = 0.4
-    gravity_power: float = 0.0
+    stiffness: float | np.ndarray = 1.0
+    drag: float | np.ndarray = 0.4
+    gravity_power: float | np.ndarray = 0.0
 
 
 def spring_bones(
@@ -40,34 +40,49 @@ def spring_bones(
         chains: the hair joints.
         heads: canonical space to world, (C, T, 4, 4).
         step: time between frames [s].
-        settings: as the artist sets them.
+        settings: as the artist sets them; arrays (C,) give each clip its own.
     """
     heads = np.asarray(heads, float)
     clips, frames = heads.shape[:2]
+    stiffness, drag, gravity = (
+        np.reshape(value, (-1, 1, 1)) for value in (settings.stiffness, settings.drag, settings.gravity_power)
+    )
     first = np.array([np.flatnonzero(chains.bone_joint == j)[0] for j in range(len(chains))])
-    bones, lengths = chains.bones[first], chains.lengths[first]
-    way = chains.ways
+    bones, lengths = chains.bones[first], chains.lengths[first][:, None]
     rest_tail = chains.origins + bones
     tail = np.einsum("cij,nj->cni", heads[:, 0, :3, :3], rest_tail) + heads[:, 0, None, :3, 3]
     previous = tail.copy()
     result = np.empty((clips, frames, len(chains), 4), np.float32)
+    # The head stands before the joints, as the parent of those that have none.
+    world, place = np.empty((clips, len(chains) + 1, 3, 3)), np.empty((clips, len(chains) + 1, 3))
+    generations = [(joints, chains.parents[joints] + 1) for joints in _generations(chains.parents)]
     for frame in range(frames):
-        rotation, origin = heads[:, frame, :3, :3], heads[:, frame, :3, 3]
-        world = np.empty((clips, len(chains), 3, 3))
-        place = np.empty((clips, len(chains), 3))
-        for j, parent in enumerate(chains.parents):
-            carrier = rotation if parent < 0 else world[:, parent]
-            place[:, j] = (origin if parent < 0 else place[:, parent]) + carrier @ way[j]
-            axis = carrier @ (bones[j] / lengths[j])
-            new = tail[:, j] + (tail[:, j] - previous[:, j]) * (1 - settings.drag)
-            new = new + axis * settings.stiffness * step + np.array([0.0, -1.0, 0.0]) * settings.gravity_power * step
-            new = _at_length(place[:, j], new, lengths[j])
-            previous[:, j], tail[:, j] = tail[:, j], new
-            local = np.einsum("cji,cj->ci", carrier, new - place[:, j]) / lengths[j]
-            turn = quaternion_between(bones[j], local)
-            result[:, frame, j] = turn = turn / np.linalg.norm(turn, axis=-1, keepdims=True)
-            world[:, j] = carrier @ from_quaternion(turn)
+        world[:, 0], place[:, 0] = heads[:, frame, :3, :3], heads[:, frame, :3, 3]
+        for joints, parent in generations:
+            carrier = world[:, parent]
+            origin = place[:, joints + 1] = place[:, parent] + _turned(carrier, chains.ways[joints])
+            axis = _turned(carrier, bones[joints] / lengths[joints])
+            now = tail[:, joints]
+            new = now + (now - previous[:, joints]) * (1 - drag) + axis * stiffness * step
+            new = _at_length(origin, new + np.array([0.0, -1.0, 0.0]) * gravity * step, lengths[joints])
+            previous[:, joints], tail[:, joints] = now, new
+            local = np.einsum("cnji,cnj->cni", carrier, new - origin) / lengths[joints]
+            turn = quaternion_between(bones[joints], local)
+            result[:, frame, joints] = turn = turn / np.linalg.norm(turn, axis=-1, keepdims=True)
+            world[:, joints + 1] = carrier @ from_quaternion(turn)
     return result
+
+
+def _generations(parents: np.ndarray) -> list[np.ndarray]:
+    """Joints without a parent, then their children, and so on; joints (N,) come behind their parents, which are below 0 if none."""
+    depth = np.zeros(len(parents), int)
+    for joint, parent in enumerate(parents):
+        depth[joint] = depth[parent] + 1 if parent >= 0 else 0
+    return [np.flatnonzero(depth == each) for each in range(depth.max(initial=-1) + 1)]
+
+
+def _turned(rotations: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    return np.einsum("cnij,nj->cni", rotations, vectors)
 
 
 def _at_length(origin, point, length):

@@ -3,7 +3,7 @@
 teleport, and at what cost.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 
 import numpy as np
 
@@ -77,7 +77,8 @@ def motion_report(
     heads = np.stack([rig.character.canonical_to_world(j) for j in joints])
     say(1, 4, "moving spring bones, for comparison")
     fits = [SpringSettings(s, d, g) for s in (0.3, 1.0, 2.5) for d in (0.15, 0.4) for g in (0.0, 0.6)]
-    springs = [spring_bones(rig.chains, heads, 1 / RATE, fit) for fit in fits]
+    each = SpringSettings(*(np.repeat([astuple(fit)[i] for fit in fits], len(heads)) for i in range(3)))
+    springs = np.split(spring_bones(rig.chains, np.tile(heads, (len(fits), 1, 1, 1)), 1 / RATE, each), len(fits))
     best = int(np.argmin([np.square(hair_points(rig, s) - true).sum(-1).mean() for s in springs]))
     candidates = {SPRINGS: springs[best], DEFAULTS: springs[fits.index(SpringSettings())]}
     for name, model in models.items():
