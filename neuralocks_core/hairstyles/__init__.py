@@ -23,7 +23,7 @@ STYLES = {**loose.STYLES, **tied.STYLES}
 
 MOST_STRANDS = 150_000
 
-__all__ = ["MOST_STRANDS", "STYLES", "Obstacle", "Scalp", "from_head", "grow"]
+__all__ = ["MOST_STRANDS", "STYLES", "Obstacle", "Scalp", "check_style", "from_head", "grow"]
 
 _ROOTS, _AXES = 80, 430
 """Progress in thousandths, for many strands, when their roots are placed, and when their axes are grown."""
@@ -58,16 +58,11 @@ def grow(
     Raises:
         NeuralocksError: an unknown style, no scalp, a strand count out of range, or a variation below 0.
     """
-    if style not in STYLES:
-        raise NeuralocksError(f"style '{style}': is unknown; use one of {', '.join(STYLES)}")
+    check_style(style, count, variation)
     if not isinstance(scalp, Scalp):
         raise NeuralocksError(
             f"scalp: {scalp!r} is not one; give a Scalp, such as hairstyles.from_head marks on a head"
         )
-    if not 1 <= count <= MOST_STRANDS:
-        raise NeuralocksError(f"style '{style}': {count} strands are out of range; give 1 to {MOST_STRANDS}")
-    if variation < 0:
-        raise NeuralocksError(f"style '{style}': there is no variation {variation}; give 0 or more")
     random = np.random.default_rng(seed)
     obstacle = body if isinstance(body, Obstacle) else Obstacle(scalp, body)
     size = scalp.radius / 0.1
@@ -100,6 +95,20 @@ def grow(
         root_uv=root_uv(site.roots.place, scalp.head_centre),
         guides=guides,
     )
+
+
+def check_style(style: str, count: int, variation: int = 0) -> None:
+    """Refuse what `grow` cannot grow; it takes seconds to look at a head first.
+
+    Raises:
+        NeuralocksError: an unknown style, a strand count out of range, or a variation below 0.
+    """
+    if style not in STYLES:
+        raise NeuralocksError(f"style '{style}': is unknown; use one of {', '.join(STYLES)}")
+    if not 1 <= count <= MOST_STRANDS:
+        raise NeuralocksError(f"style '{style}': {count} strands are out of range; give 1 to {MOST_STRANDS}")
+    if variation < 0:
+        raise NeuralocksError(f"style '{style}': there is no variation {variation}; give 0 or more")
 
 
 def _site(style: Style, scalp: Scalp, count: int, random: np.random.Generator, size: float) -> Site:

@@ -14,7 +14,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
 from neuralocks_core.groom import LARGEST_COORDINATE, Groom
-from neuralocks_core.hairstyles import Obstacle, Scalp, from_head
+from neuralocks_core.hairstyles import Obstacle, Scalp, check_style, from_head
 from neuralocks_core.hairstyles import grow as grow_style
 from neuralocks_core.hairstyles.fitting import Fitted, fit
 from neuralocks_core.progress import Progress, silent, within
@@ -64,6 +64,7 @@ def grow(
     """
     out = as_path(out, "out")
     check_layer_name(out)
+    check_style(style, count, variation)
     rigs = read_rigs(character, skeleton, head)
     rig = rigs[0]
     (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
