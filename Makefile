@@ -12,8 +12,9 @@ BIN    := $(VENV)/bin
 # Modules are compiled when they are first imported: most of what is installed never is.
 PIP_INSTALL = -m pip --disable-pip-version-check install -q --no-compile
 INSTALL = $(BIN)/python $(PIP_INSTALL)
-# One thread a process: the tests run in two processes, and small matrices only get slower with more.
-ONE_THREAD = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+# One thread a process: the tests run in two processes, and small matrices only get slower with more. Some images tell
+# Python not to keep what it compiles: then each of the hundreds of processes that tests start compiles all it imports.
+TESTING = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 
 .PHONY: demo test lint tests lowest blender addon native bench clean
 
@@ -27,7 +28,7 @@ lint: $(VENV)/installed-test
 	$(BIN)/ruff format --check -q .
 
 tests: $(VENV)/installed-test blender
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -q
+	$(TESTING) $(BIN)/python -m pytest -n 2 --dist loadfile -q
 
 # "name>=1.2,<2" is "name==1.2" at the least. Old packages warn of newer ones below them, and tidy up
 # less well.
@@ -36,7 +37,7 @@ FLOORS = $(shell $(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproj
 lowest: $(VENV)/installed-test
 	$(PYTHON) -m venv .venv-lowest
 	.venv-lowest/bin/python $(PIP_INSTALL) $(FLOORS) -e ".[test]" onnx
-	$(ONE_THREAD) .venv-lowest/bin/python -m pytest -n 2 --dist loadfile -q -W ignore::DeprecationWarning \
+	$(TESTING) .venv-lowest/bin/python -m pytest -n 2 --dist loadfile -q -W ignore::DeprecationWarning \
 	    -W ignore::pytest.PytestUnraisableExceptionWarning \
 	    --ignore tests/core/physics --ignore tests/core/training --ignore tests/blender
 

@@ -19,6 +19,7 @@ from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rotation import from_quaternion, from_vector
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig import dynamic as rig_dynamic
+from neuralocks_core.training.rig import report as rig_report
 from neuralocks_core.training.rig.body import posed_distances, rest_distances
 from neuralocks_core.training.rig.dynamic import train_dynamic
 from neuralocks_core.training.rig.energy import RigEnergy, bounded_turns
@@ -265,6 +266,7 @@ def test_a_teleport_and_other_frame_rates():
 def test_progress_goes_on_through_the_report(monkeypatch):
     """In both trainings: never backwards, to the end of the bar, and with messages on the report's progress."""
     monkeypatch.setattr(rig_dynamic, "motion_report", partial(motion_report, kinds=("nod",)))
+    monkeypatch.setattr(rig_report, "OPTIMISED", 20)
     rig, _ = with_balls()
     for train, options in ((train_static, {}), (train_dynamic, {"clips": 2, "clip_seconds": 0.5})):
         told = []
