@@ -118,22 +118,27 @@ def _ends(rig, turns: np.ndarray) -> np.ndarray:
 
 
 def _optimise(energy, pool, poses, gravity, max_angle, start, say) -> np.ndarray:
-    """Turns (B, N, 4) of the lowest energy that Adam finds from the network's own output and from rest."""
+    """Turns (B, N, 4) of the lowest energy that Adam meets on its way from the network's own output and from rest; its steps may
+    push hair through the body, from where it does not come back.
+    """
     vector = start[..., 1:] / np.sin(max_angle / 2)
     near = vector / np.sqrt(np.maximum(1 - np.sum(vector**2, axis=-1, keepdims=True), 1e-3))
     lowest, state = np.full(len(poses), np.inf), start
     for turn, first in enumerate((near, np.zeros_like(near))):
         raw = torch.tensor(first, dtype=torch.float32, requires_grad=True)
         optimiser = torch.optim.Adam([raw], lr=0.03, betas=(0.8, 0.98))
-        for step in range(OPTIMISED):
+        for step in range(OPTIMISED + 1):
+            turns = bounded_turns(raw, max_angle)
+            values = sum(energy.parts(pool, poses, turns, gravity))
+            met = values.detach().numpy()
+            better = met < lowest
+            lowest = np.where(better, met, lowest)
+            state = np.where(better[:, None, None], turns.detach().numpy(), state)
+            if step == OPTIMISED:
+                break
             say(turn * OPTIMISED + step, 2 * OPTIMISED, "optimising directly, for comparison")
             optimiser.param_groups[0]["lr"] = 0.03 * (1 - step / OPTIMISED) ** 1.5 + 1e-4
             optimiser.zero_grad()
-            sum(energy.parts(pool, poses, bounded_turns(raw, max_angle), gravity)).sum().backward()
+            values.sum().backward()
             optimiser.step()
-        with torch.no_grad():
-            turns = bounded_turns(raw, max_angle)
-            values = sum(energy.parts(pool, poses, turns, gravity)).numpy()
-        better = values < lowest
-        lowest, state = np.where(better, values, lowest), np.where(better[:, None, None], turns.numpy(), state)
     return state.astype(float)

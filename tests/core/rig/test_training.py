@@ -10,6 +10,7 @@ import trimesh
 
 torch = pytest.importorskip("torch")
 
+from neuralocks_core.progress import silent
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig import find_chains, rig_spec
@@ -261,6 +262,25 @@ def test_a_teleport_and_other_frame_rates():
     assert report["rates"]["network"]["24 fps"] < 0.5 < report["rates"][SPRINGS]["24 fps"]
     assert report["cost"]["network"]["bytes_carried_on"] == 0
     assert set(report["motion_error"]) > {"network", SPRINGS}
+
+
+def test_direct_optimisation_is_never_worse_than_the_network_it_begins_with(monkeypatch):
+    """Where a step of Adam leaves a narrow valley, as between a hat and a shoulder, and does not come back."""
+
+    class Valley:
+        """As `RigEnergy.parts`: a degree beside the bottom of a valley it is flat."""
+
+        @staticmethod
+        def parts(pool, poses, turns, gravity):
+            depth = torch.exp(-(turns[..., 1:] - 0.3).square().sum((-1, -2)) / 0.01**2)
+            return -depth, torch.zeros_like(depth)
+
+    monkeypatch.setattr(rig_report, "OPTIMISED", 20)
+    turns = np.full((2, 1, 4), 0.3 + np.array([0.004, 0.002])[:, None, None])
+    turns[..., 0] = np.sqrt(1 - np.square(turns[..., 1:]).sum(axis=-1))
+    found = rig_report._optimise(Valley, None, np.arange(2), None, 2.4, turns, silent)
+    energy = [Valley.parts(None, None, torch.as_tensor(state), None)[0].numpy() for state in (turns, found)]
+    assert (energy[1] <= energy[0] + 1e-4).all()
 
 
 def test_progress_goes_on_through_the_report(monkeypatch):
