@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether points lie inside a mesh that may fold into itself."""
+"""Whether points lie inside a mesh that may fold into itself, or consist of parts that stand in each other."""
+
+from functools import lru_cache
 
 import numpy as np
 
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.mesh import connected_pieces
 
 _DEEP = 2e-3
 """Only depths beyond this [m] are proven."""
@@ -20,8 +23,18 @@ def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.nda
 
     Points in free air that `Collider` mistakes for inside seem deeper than points that are inside. So the deepest few are
     proven, and then the next few, as long as one of them turns out to be outside.
+
+    Where closed parts stand in each other, such as an arm's end in the trunk or a head in a hat, the nearest face may be one that
+    is inside the body itself. A point is as deep as it is in the part in which it is deepest.
     """
     result = Collider(vertices, _in_reach(vertices, triangles, points)).distance(points)[0]
+    for part in _closed_parts(np.asarray(triangles, np.int64).tobytes()):
+        corners = vertices[part]
+        within = ((points >= corners.min(axis=(0, 1))) & (points <= corners.max(axis=(0, 1)))).all(axis=1)
+        if within.any() and _volume(corners) > 0:
+            some = points[within]
+            distance = Collider(vertices, _in_reach(vertices, part, some)).distance(some)[0]
+            result[within] = np.minimum(result[within], np.where(distance < 0, distance, np.inf))
     deep = np.flatnonzero(result < -_DEEP)
     deep = deep[np.argsort(result[deep], kind="stable")]
     for first in range(0, len(deep), _FEW):
@@ -31,6 +44,27 @@ def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.nda
         if not len(air):
             break
     return result
+
+
+@lru_cache(maxsize=4)  # a body has the same triangles in every frame
+def _closed_parts(triangles: bytes) -> tuple[np.ndarray, ...]:
+    """The parts (F', 3) of triangles (F, 3) int64 that have no open edge; none if all are one part."""
+    faces = np.frombuffer(triangles, np.int64).reshape(-1, 3)
+    used, places = np.unique(faces, return_inverse=True)
+    places = places.reshape(-1, 3)
+    piece = connected_pieces(places, len(used))[places[:, 0]]
+    if not len(piece) or not piece.any():
+        return ()
+    ways = np.concatenate([places[:, [0, 1]], places[:, [1, 2]], places[:, [2, 0]]])
+    there, back = ways @ [len(used), 1], ways @ [1, len(used)]
+    open_pieces = np.unique(np.tile(piece, 3)[~np.isin(back, there)])
+    return tuple(faces[piece == number] for number in np.setdiff1d(piece, open_pieces))
+
+
+def _volume(corners: np.ndarray) -> float:
+    """Six times what triangles (F, 3, 3) enclose; less than zero if they face inward, as those of a toon outline do."""
+    a, b, c = np.moveaxis(corners - corners[0, 0], 1, 0)
+    return float(np.sum(a * np.cross(b, c)))
 
 
 def _in_reach(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:

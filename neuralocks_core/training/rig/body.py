@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.enclosed import proven_distances
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.rigging import HairRig
@@ -73,7 +72,7 @@ def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
     body = rig.character.body
     if body is None:
         return np.full(len(points), np.inf)
-    return Collider(rig.character.canonical(rig.character.body.points), body.triangles).distance(points)[0]
+    return proven_distances(rig.character.canonical(body.points), body.triangles, points)
 
 
 def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -41,6 +41,17 @@ def test_air_beside_a_crease_is_no_depth():
     assert (proven_distances(points, box.faces, air) > 0.01).all()
 
 
+def test_a_limb_that_ends_in_a_trunk_hides_no_depth():
+    """The nearest face is that of the limb's end, which faces the point."""
+    trunk, limb = trimesh.creation.icosphere(4, 0.1), trimesh.creation.box((0.2, 0.06, 0.06))
+    limb.apply_translation((0.15, 0, 0))  # it ends 5 cm in
+    body = trimesh.util.concatenate([trunk, limb])
+    points = np.array([[0.04, 0.0, 0.0], [0.045, 0.02, 0.01], [0.2, 0, 0], [0.0, 0.12, 0.0], [0.11, 0.05, 0.0]])
+    assert (Collider(body.vertices, body.faces).distance(points[:2])[0] > 0).all()
+    found = proven_distances(body.vertices, body.faces, points)
+    np.testing.assert_allclose(found, [-0.06, np.linalg.norm(points[1]) - 0.1, -0.03, 0.02, 0.02], atol=1e-3)
+
+
 def test_few_points_are_measured_as_many_are():
     """Few points are compared only with the triangles in their reach; far and near points, inside and outside."""
     ball = trimesh.creation.icosphere(4, 0.1)

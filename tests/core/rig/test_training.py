@@ -205,6 +205,23 @@ def test_margins_are_those_at_rest_at_most():
     np.testing.assert_allclose(RigEnergy(rig, RigMaterial()).margins, [-0.004, 0.003, 0.008], atol=1e-3)
 
 
+def test_hair_that_rests_in_a_hat_is_not_pushed():
+    """Also beside the head, whose skin in the hat is nearest and faces it."""
+    rig, radius = with_balls()
+    head, hat = rig.character.body, trimesh.creation.box((0.3, 0.3, 0.3))
+    hat.apply_translation((0, 1.77, 0.02))
+    body = Body(
+        np.concatenate([head.points, hat.vertices]),
+        np.concatenate([head.triangles, hat.faces + len(head.points)]),
+        np.concatenate([head.joint_indices, np.repeat(head.joint_indices[:1], len(hat.vertices), axis=0)]),
+        np.concatenate([head.joint_weights, np.ones((len(hat.vertices), 1))]),
+    )
+    points = np.array([[0, 0.07 + radius + 0.01, 0.02]])
+    rig = replace(rig, character=replace(rig.character, body=body), points=points, weights=rig.weights[:1])
+    assert rest_distances(rig, points)[0] == pytest.approx(-0.13, abs=1e-3)
+    assert RigEnergy(rig, RigMaterial()).margins < 0
+
+
 def test_hair_over_the_faces_of_a_coarse_body_is_not_thrown_off():
     """There the plane of the nearest vertex is centimetres above the surface."""
     rig, _ = with_balls()
