@@ -9,6 +9,8 @@ from ..border.amounts import check_number
 
 LOWEST, HIGHEST = 1e-6, 1e4
 """Range of a material's bend, weight and damping."""
+_FEW = 4
+"""Up to this many chains are named in an error."""
 _MADE = ("command", "steps", "seconds", "seed", "clips", "began with")
 
 
@@ -51,11 +53,16 @@ class Beginning:
         """Refuse a model for other chains than these."""
         with about(self._path):
             self.model.chains.check_same(here)
-            if self.model.chains.names != here.names:
-                raise NeuralocksError(
-                    f"model: its {len(self.model.chains)} joints are not the {len(here)} of this rig in the same order; "
-                    "train without --begin"
-                )
+            own = self.model.chains
+            if own.names == here.names:
+                return
+            known = [name for name in here.names if name in own.names]
+            named = " ".join(f"--chains {name}" for name in own.tops[:_FEW]) + " ..." * (len(own.tops) > _FEW)
+            # It was trained for some of the chains, or in some order of the file: only the former can be asked for.
+            remedy = f"name its chains as in its training ({named}), or train" if tuple(known) == own.names else "train"
+            raise NeuralocksError(
+                f"model: its {len(own)} joints are not the {len(here)} of this rig in the same order; {remedy} without --begin"
+            )
 
     def card(self) -> dict:
         """How it was made."""
