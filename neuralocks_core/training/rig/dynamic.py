@@ -46,7 +46,7 @@ _POOL = 256
 """Number of bodies held ready, and as many in motion."""
 _HELD, _MOVING, _WORST = 16, 8, 8
 """Bodies in held poses, in motion, and in the poses in which hair lies deepest, whose contact counts in a step."""
-_CLIP_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.3, 0.03, 40.0
+_CLIP_TAKES, _POSING_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.3, 8.0, 0.03, 40.0
 """Approximate time that each takes [s], for even progress."""
 _MOMENTS = 16
 """Moments of each simulated motion, from which the bodies in motion are drawn."""
@@ -95,8 +95,8 @@ def train_dynamic(
     say = progress or silent
     spec = rig_spec(dynamic=True)
     simulating, learning = _CLIP_TAKES * clips, seconds if steps is None else _STEP_TAKES * steps
-    ends = np.cumsum([simulating, learning, _REPORT_TAKES])
-    simulated, learned = (1000 * ends[:2] / ends[2]).astype(int).tolist()
+    ends = np.cumsum([simulating, _POSING_TAKES, learning, _REPORT_TAKES])
+    simulated, posed, learned = (1000 * ends[:3] / ends[3]).astype(int).tolist()
     features, turns, moments = _simulated(rig, material, spec, clips, clip_seconds, rng, within(say, 0, simulated))
     say(simulated, 1000, "posing bodies")
     held = HairOnBodies(rig, _roomy(material, _HELD_ROOM), _POOL, rng, spec)
@@ -134,7 +134,7 @@ def train_dynamic(
     rate = _RATE_ON if begin else _RATE
     schedule = Schedule(minutes=seconds / 60, steps=steps, rate=rate, warm_up=50)
     for state in descend(muon(net, rate, 0.1), losses, schedule, remedy=REMEDIES["rig"]):
-        far = simulated + int((learned - simulated) * state.done)
+        far = posed + int((learned - posed) * state.done)
         say(far, 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
     training = {
         "method": "dynamic, regression on simulated chains",
