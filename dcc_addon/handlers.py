@@ -17,6 +17,7 @@ from .scene.last_called import go_last, others_called
 from .scene.layers import working_in
 from .scene.lively import lively
 from .scene.locked import lock
+from .scene.overrides import make_comparable
 from .scene.save_as import Remade
 from .scene.together import drawn_with
 from .scene.up_to_date import ensure
@@ -52,7 +53,9 @@ def on_update(scene, graph):
         if isinstance(thing, bpy.types.Mesh):
             session.weights.pop(thing.name_full, None)
     objects = {o.name_full: o for o in changed if isinstance(o, bpy.types.Object)}
-    show_rest_left([o.original for o in objects.values()])
+    originals = [o.original for o in objects.values()]
+    make_comparable(originals)  # a library may have been reloaded
+    show_rest_left(originals)
     if live.bereft(scene):
         live.update(scene, graph)
     names = {a.name_full for a in live.carriers(scene)}
@@ -80,6 +83,7 @@ def on_load(*_):
     if bpy.data.filepath:
         session.opened = {scene.name_full: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
     renewed.compare()
+    make_comparable(bpy.data.objects)
     own = lively(bpy.data.objects)
     if own.hairs or own.armatures:
         lock()
@@ -105,6 +109,7 @@ def before_save(target=None, *_):
     """
     blur.end()
     renewed.remember()
+    make_comparable(bpy.data.objects)
     for scene in bpy.data.scenes:
         live.show_rest(scene)
     show_all_rest()

@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+import dcc_addon
 from dcc_addon.scene.attach import has_cache
 from tests.blender import scenes
 from tests.blender.checks import (
@@ -85,6 +86,36 @@ def keys_of_a_library(folder: Path) -> None:
     for operator in (bpy.ops.neuralocks.bake_keys, bpy.ops.neuralocks.remove_keys):
         refused(operator, "Neuralocks Hair", "library.blend", "star")
     assert not any(track.mute for track in rig.animation_data.nla_tracks)
+
+
+def set_in_a_shot(folder: Path) -> None:
+    """What is chosen for an override of a character whose library knows nothing of this add-on lasts when the shot is opened again,
+    when the library is loaded again, and when the override is resynchronised.
+    """
+    dcc_addon.unregister()
+    scenes.armature()
+    scenes.collect("Character")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    dcc_addon.register()
+    scenes.empty()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Character"]
+    bpy.data.collections["Character"].override_hierarchy_create(
+        bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
+    )
+    own = _own("ARMATURE").neuralocks_character
+    own.head_bone, own.wind = "head", 3.0
+    rig = _opened_again(folder)
+    assert (rig.neuralocks_character.head_bone, rig.neuralocks_character.wind) == ("head", 3.0)
+    for reloaded in (False, True) if bpy.app.version >= (4, 0) else ():  # older ones have no such call
+        if reloaded:
+            bpy.data.libraries[0].reload()
+            bpy.context.view_layer.update()
+        root = _own("ARMATURE").override_library.hierarchy_root
+        root.override_library.resync(bpy.context.scene, view_layer=bpy.context.view_layer)
+        own = _own("ARMATURE").neuralocks_character
+        assert (own.head_bone, own.wind) == ("head", 3.0), reloaded
 
 
 def cached_in_a_shot(folder: Path) -> None:
