@@ -12,6 +12,7 @@ from . import blur
 from .muting import CACHE as MODIFIER
 from .muting import mute_deformers, off_meanwhile, unmute_deformers
 from .paths import full
+from .rewritten import read_again
 from .save_as import named_here
 
 REPLACED = "replaced"
@@ -81,14 +82,15 @@ def is_imported(path: str) -> bool:
 
 def renew(path: str, prims: dict[str, str]) -> None:
     """Show what has just been written to the USD file `path` on the hair that plays it: its prim of `prims`, by its name."""
-    for hair in players(path):
+    playing = players(path)
+    for hair in playing:
         modifier = hair.modifiers[MODIFIER]
         prim = prims.get(hair.name_full, modifier.object_path)
         if modifier.object_path != prim:
             modifier.object_path = prim
         blur.attach(hair)
-        with bpy.context.temp_override(edit_cachefile=modifier.cache_file):
-            bpy.ops.cachefile.reload()
+    if playing:
+        read_again({hair.modifiers[MODIFIER].cache_file for hair in playing})
 
 
 def attach(hair, path: str, prim: str, scene) -> None:
@@ -96,6 +98,7 @@ def attach(hair, path: str, prim: str, scene) -> None:
     detach(hair)
     mute_deformers(hair, REPLACED)
     cache = _cache_file(path)
+    read_again([cache])
     cache.scale = 1.0
     _follow_time(cache, scene)
     modifier = hair.modifiers.get(MODIFIER) or hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")

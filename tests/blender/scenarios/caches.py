@@ -86,6 +86,49 @@ def baked_over(folder: Path) -> None:
     assert apart(points_at(bpy.data.objects["Hair.L"], 9), shown) < SAME
 
 
+def held_elsewhere(folder: Path) -> None:
+    """A bake over a file is shown although more than the view plays it: a render with persistent data, another view layer, or another
+    object with a cache of its own.
+    """
+    needs_usd()
+    operators, rig, scene = bpy.ops.neuralocks, scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    scene.frame_end, scene.neuralocks.output = 10, str(folder / "hair.usdc")
+    scene.collection.objects.link(camera := bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera")))
+    scene.camera, scene.render.engine, scene.render.use_persistent_data = camera, "CYCLES", True
+    scene.render.resolution_x, scene.render.resolution_y, scene.cycles.samples = 8, 8, 1
+    make_live(rig, strands)
+
+    def attached(motion: float) -> None:
+        strands.neuralocks_hair.motion, strands.neuralocks_hair.live = motion, True
+        live = points_at(strands, 9)
+        assert operators.bake_attach() == {"FINISHED"}
+        assert apart(points_at(strands, 9), live) < SAME, "the cache from before is shown"
+
+    attached(1.0)
+    bpy.ops.render.render()
+    attached(0.2)
+    assert scene.render.use_persistent_data
+    layers, window = scene.view_layers, bpy.context.window
+    for layer in (layers.new("Other"), layers[0]):
+        window.view_layer = layer
+        points_at(strands, 5)
+    attached(1.0)
+    strands.neuralocks_hair.motion = 0.2
+    twin = strands.copy()
+    twin.data = strands.data.copy()
+    scene.collection.objects.link(twin)
+    own = twin.modifiers["Neuralocks Cache"]
+    own.cache_file = own.cache_file.copy()
+    before = points_at(twin, 9)
+    assert operators.bake() == {"FINISHED"}
+    for hair in (strands, twin):
+        prim = hair.modifiers["Neuralocks Cache"].object_path
+        shown = points_at(hair, 9)
+        assert apart(shown, baked_points(scene.neuralocks.output, prim, 9)) < SAME < apart(shown, before), hair.name
+
+
 def taken_off(folder: Path) -> None:
     """A cache plays the baked frames even if time is stretched; when it is removed, even while live is on, the hair follows its
     surface as before.
