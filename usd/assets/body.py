@@ -68,13 +68,16 @@ def _mesh(stage, body):
 
 
 def _blend_shapes(stage, binding, shapes) -> None:
-    paths = []
+    names, paths = [], []
     for name, offsets in shapes.items():
-        shape = UsdSkel.BlendShape.Define(stage, f"{MESH}/{name}")
         # Only points that move by a hundredth of a millimetre are stored.
         moved = np.flatnonzero(np.abs(offsets).max(axis=1) > 1e-5)
+        if not len(moved):  # the body's own phenotype is this shape already
+            continue
+        shape = UsdSkel.BlendShape.Define(stage, f"{MESH}/{name}")
         shape.CreateOffsetsAttr(vectors(offsets[moved]))
         shape.CreatePointIndicesAttr(integers(moved))
+        names.append(name)
         paths.append(Sdf.Path(str(shape.GetPath())))
-    binding.CreateBlendShapesAttr(list(shapes))
+    binding.CreateBlendShapesAttr(names)
     binding.CreateBlendShapeTargetsRel().SetTargets(paths)

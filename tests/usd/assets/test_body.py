@@ -70,13 +70,20 @@ def test_the_scalp_is_the_upper_head():
     assert abs(points[scalp, 0].mean()) < 0.002
 
 
-def test_a_body_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+def small_body(shapes):
+    """A body of one square face on two joints; `shapes` are factors of its points by name."""
     points = np.array([[0, 1.8, 0], [0.1, 1.8, 0], [0.1, 1.7, 0], [0, 1.7, 0]], float)
     bind = np.tile(np.eye(4), (2, 1, 1))
     bind[:, 1, 3] = [1.0, 1.6]
-    skin = Body(points, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 1), int), np.ones((4, 1)), {"wide": 0.1 * points})
+    offsets = {name: factor * points for name, factor in shapes.items()}
+    skin = Body(points, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 1), int), np.ones((4, 1)), offsets)
     character = Character(Skeleton(["hips", "hips/head"], [-1, 0], bind), skin)
-    body = StatisticalBody(character, np.array([[0, 1, 2, 3]]), np.array([0]), np.full((4, 3), 0.5))
+    return StatisticalBody(character, np.array([[0, 1, 2, 3]]), np.array([0]), np.full((4, 3), 0.5))
+
+
+def test_a_body_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    body = small_body({"wide": 0.1})
+    points, bind = body.character.body.points, body.character.skeleton.bind
     path = write_body(tmp_path / "made" / "body.usda", body)
     assert not findings(path)
     assert [p.name for p in path.parent.iterdir()] == ["body.usda"]
@@ -87,6 +94,12 @@ def test_a_body_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     monkeypatch.setattr("usd.assets.body.statistical_body", None)  # because it takes a minute
     with pytest.raises(NeuralocksError, match="not a folder, on the way"):
         write_body(path / "body.usda")
+
+
+def test_a_shape_that_the_body_has_already_is_left_out(tmp_path):
+    """As `heavy` of a body of weight 1: a shape without offsets would be reported by whatever reads the file."""
+    (rig,) = read_rigs(write_body(tmp_path / "body.usda", small_body({"heavy": 0.0, "tall": 0.1})))
+    assert list(rig.character.body.shapes) == ["tall"] and not rig.notes
 
 
 @pytest.mark.parametrize(("name", "value"), [("size", 0.5), ("age", 2.0)])
