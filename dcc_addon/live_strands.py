@@ -19,7 +19,7 @@ from .pose import pose
 from .scene import curves
 from .scene.layers import graph_of, layer_of
 from .scene.lively import lively
-from .scene.lookup import find, identity, in_scene
+from .scene.lookup import check_found, find, identity, in_scene
 from .scene.muting import mute_deformers, unmute_deformers
 from .scene.placing import world
 from .scene.sampling import shown_frame
@@ -61,6 +61,8 @@ def at_once(graph) -> bool:
 
 def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
     armature = hair.neuralocks_hair.armature
+    if armature is not None:
+        check_found(armature)
     if armature is None or not in_scene(armature, home):
         raise NeuralocksError(
             f"{hair.name_full}: it has no armature in this scene; choose the character above and press Attach to Character"

@@ -12,7 +12,7 @@ from neuralocks_core.time_left import TimeLeft
 
 from .. import background
 from ..live import refresh
-from ..scene.lookup import in_scene
+from ..scene.lookup import check_found, in_scene
 from ..scene.paths import FILE
 from ..scene.sampling import in_slices
 from ..services.panel_errors import for_the_panel
@@ -176,9 +176,11 @@ def shown_armature(context):
     """The armature that the panel shows.
 
     Raises:
-        NeuralocksError: there is none.
+        NeuralocksError: there is none, or it is from a library that was not found.
     """
     armature = context.scene.neuralocks.armature
+    if armature is not None:
+        check_found(armature)
     if armature is None or not in_scene(armature, context.scene):
         raise NeuralocksError("Character: no armature chosen; choose the armature of your character in the panel")
     return armature

@@ -5,6 +5,7 @@ import numpy as np
 
 from ..services import names
 from ..services.rig import RigArrays
+from .lookup import check_found
 from .skinned import bones_with_skin
 
 
@@ -15,7 +16,12 @@ def matrix(value) -> np.ndarray:
 
 
 def read(armature, head_bone: str = "") -> RigArrays:
-    """The rest pose, bones ordered parents first."""
+    """The rest pose, bones ordered parents first.
+
+    Raises:
+        NeuralocksError: the armature is from a library that was not found.
+    """
+    check_found(armature)
     bones = armature.data.bones
     index = {bone.name: i for i, bone in enumerate(bones)}
     parents = [index[bone.parent.name] if bone.parent else -1 for bone in bones]

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Data of other files: linked, overridden, instanced, appended."""
 
+import contextlib
 import shutil
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 
@@ -69,6 +71,36 @@ def linked(folder: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     strands = next(o for o in bpy.data.objects if o.type == "CURVES" and not o.library)
     assert strands.neuralocks_hair.live and "neuralocks_rest" not in strands.data.attributes
+
+
+def not_found(folder: Path) -> None:
+    """Local hair on a character whose library is not there when the shot is opened says so, and moves again when it is back."""
+    if "is_missing" not in bpy.types.ID.bl_rna.properties:
+        raise SkipTest("this Blender does not tell what is missing")
+    _character_library(folder)
+    library, shot = folder / "library.blend", str(folder / "shot.blend")
+    scenes.empty()
+    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
+        wanted.objects = ["Rig"]
+    rig = bpy.data.objects["Rig"]
+    bpy.context.scene.collection.objects.link(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    shown = points_at(strands, 9)
+    bpy.ops.wm.save_as_mainfile(filepath=shot)
+
+    library.rename(folder / "elsewhere.blend")
+    with contextlib.suppress(RuntimeError):  # Blender reports it
+        bpy.ops.wm.open_mainfile(filepath=shot)
+    points_at(bpy.data.objects["Hair"], 9)
+    assert "library.blend was not found" in messages()["Hair"], messages()
+    refused(bpy.ops.neuralocks.sample_motion, "library.blend was not found")
+    bpy.ops.wm.save_mainfile()
+
+    (folder / "elsewhere.blend").rename(library)
+    bpy.ops.wm.open_mainfile(filepath=shot)
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert apart(points_at(bpy.data.objects["Hair"], 9), shown) < SAME and not messages(), messages()
 
 
 def instanced(folder: Path) -> None:
