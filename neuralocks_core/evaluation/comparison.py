@@ -104,15 +104,17 @@ def simulated(
     options = {"wind": wind, "volume": volume}
     result, runs = np.empty((len(times), *strands.rest.shape), np.float32), np.unique(run)
     for number, each in enumerate(runs):
-        i, rows = each // 2, run == each
+        i, rows = each // 2, slice(*np.searchsorted(run, [each, each + 1]))  # times ascend, and so do runs
         start = times[0] if i == part[0] else parts[i].start
         say = within(progress or silent, 1000 * number // len(runs), 1000 * (number + 1) // len(runs))
-        result[rows] = _from(start, character, strands, parts[i], times[rows], material, **options, progress=say)
+        _from(start, character, strands, parts[i], times[rows], result[rows], material, **options, progress=say)
     return result
 
 
-def _from(start: float, character, strands, clip, times, material, wind: Wind | None, **options) -> np.ndarray:
-    """The same as `simulated`, for a clip without cuts, with hair at rest at `start` [s]."""
+def _from(start: float, character, strands, clip, times, into, material, wind: Wind | None, **options) -> None:
+    """The same as `simulated`, for a clip without cuts, with hair at rest at `start` [s]; written `into` (T, S, 24, 3): for minutes
+    of motion, each copy takes gigabytes.
+    """
     from neuralocks_core.reference import simulate
 
     stepped = Stepped.of(clip, joints_read(character))
@@ -137,7 +139,8 @@ def _from(start: float, character, strands, clip, times, material, wind: Wind | 
         wind=wind and wind.at(clock, clip.period),
         **options,
     )
-    return _between(clock, rollout.points, times) - strands.rest
+    _between(clock, rollout.points, times, into)
+    into -= strands.rest
 
 
 def _without_stop(character: Character, clip: Clip, clock: np.ndarray, last: float) -> np.ndarray:
@@ -171,18 +174,17 @@ class _PosedBody(Sequence):
         return self._body.posed(self._skinning[frame], self._shapes[frame])
 
 
-def _between(clock: np.ndarray, points: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Points (T, S, 24, 3) float32 at times (T,), all within `clock` (C,), from points (C, S, 24, 3) at the clock's times:
+def _between(clock: np.ndarray, points: np.ndarray, times: np.ndarray, into: np.ndarray) -> None:
+    """Points `into` (T, S, 24, 3) float32 at times (T,), all within `clock` (C,), from points (C, S, 24, 3) at the clock's times:
     cubics whose slopes are those of a parabola through each point and its neighbours.
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    result, order = np.empty((len(times), *points.shape[1:]), np.float32), min(2, len(clock) - 1)
+    order = min(2, len(clock) - 1)
     for low in range(0, points.shape[1], TOGETHER):
         some = points[:, low : low + TOGETHER].astype(float)
         slopes = np.gradient(some, STEP, axis=0, edge_order=order)
-        result[:, low : low + TOGETHER] = CubicHermiteSpline(clock, some, slopes)(times)
-    return result
+        into[:, low : low + TOGETHER] = CubicHermiteSpline(clock, some, slopes)(times)
 
 
 def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
