@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neuralocks_core.character import levels
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rotation import from_quaternion, quaternion_between
 
@@ -55,10 +56,10 @@ def spring_bones(
     result = np.empty((clips, frames, len(chains), 4), np.float32)
     # The head stands before the joints, as the parent of those that have none.
     world, place = np.empty((clips, len(chains) + 1, 3, 3)), np.empty((clips, len(chains) + 1, 3))
-    generations = [(joints, chains.parents[joints] + 1) for joints in _generations(chains.parents)]
+    by_level = [(joints, chains.parents[joints] + 1) for joints in levels(chains.parents)]
     for frame in range(frames):
         world[:, 0], place[:, 0] = heads[:, frame, :3, :3], heads[:, frame, :3, 3]
-        for joints, parent in generations:
+        for joints, parent in by_level:
             carrier = world[:, parent]
             origin = place[:, joints + 1] = place[:, parent] + _turned(carrier, chains.ways[joints])
             axis = _turned(carrier, bones[joints] / lengths[joints])
@@ -71,14 +72,6 @@ def spring_bones(
             result[:, frame, joints] = turn = turn / np.linalg.norm(turn, axis=-1, keepdims=True)
             world[:, joints + 1] = carrier @ from_quaternion(turn)
     return result
-
-
-def _generations(parents: np.ndarray) -> list[np.ndarray]:
-    """Joints without a parent, then their children, and so on; joints (N,) come behind their parents, which are below 0 if none."""
-    depth = np.zeros(len(parents), int)
-    for joint, parent in enumerate(parents):
-        depth[joint] = depth[parent] + 1 if parent >= 0 else 0
-    return [np.flatnonzero(depth == each) for each in range(depth.max(initial=-1) + 1)]
 
 
 def _turned(rotations: np.ndarray, vectors: np.ndarray) -> np.ndarray:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulation of joint chains and the spring bones against answers that are known without them."""
+"""The simulation of joint chains against answers that are known without it."""
 
 import numpy as np
 import pytest
@@ -8,10 +8,8 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from neuralocks_core.reference.chains import ChainSolver
-from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig import find_chains
 from neuralocks_core.rig.rods import RigMaterial, RodTree
-from neuralocks_core.rotation import from_quaternion
 from tests.core.rig.builders import character, tail
 
 BONE, RATE = 0.05, 120
@@ -89,33 +87,3 @@ def test_only_damping_slows_a_chain():
     assert bare[1] / bare[0] > 0.97
     peaks = 59 / 30  # s between the two windows' peaks, within a swing
     assert np.log(damped[0] / damped[1]) == pytest.approx(damping / 2 * peaks, rel=0.15)
-
-
-def test_spring_bones_follow_those_above_them_in_the_same_frame():
-    """The procedure of VRMC_springBone 1.0 on nodes with arbitrary bind axes, from the root to the descendants."""
-    chains, step, settings = chain((0.01, -0.05, -0.02), 4), 1 / 60, SpringSettings(1.3, 0.25, 0.4)
-    time, rng = step * np.arange(40), np.random.default_rng(0)
-    head = Rotation.from_rotvec(np.stack([0.5 * np.sin(5 * time), 0.8 * np.sin(3 * time), 0.2 * time], axis=1))
-    heads = np.tile(np.eye(4), (1, len(time), 1, 1))
-    heads[0, :, :3, :3], heads[0, :, :3, 3] = head.as_matrix(), np.outer(np.sin(6 * time), [0.2, 0.1, -0.3])
-    turns = from_quaternion(spring_bones(chains, heads, step, settings)[0])
-    bind = [Rotation.from_rotvec(rng.normal(size=3)) for _ in range(len(chains))]
-    axis = [own.inv().apply(bone) for own, bone in zip(bind, chains.bones, strict=True)]
-    current = [head[0].apply(origin + bone) for origin, bone in zip(chains.origins, chains.bones, strict=True)]
-    previous = current.copy()
-    for frame in range(len(time)):
-        parent, place, ours = head[frame], heads[0, frame, :3, 3], head[frame]
-        for joint, length in enumerate(chains.lengths):
-            above = bind[joint - 1] if joint else Rotation.identity()
-            local = above.inv() * bind[joint]
-            way = chains.origins[joint] - (chains.origins[joint - 1] if joint else 0)
-            place = place + parent.apply(above.inv().apply(way))
-            tip = current[joint] + (current[joint] - previous[joint]) * (1 - settings.drag)
-            tip = tip + step * settings.stiffness * (parent * local).apply(axis[joint]) / length
-            tip = tip + step * settings.gravity_power * np.array([0, -1, 0])
-            tip = place + (tip - place) * length / np.linalg.norm(tip - place)
-            previous[joint], current[joint] = current[joint], tip
-            aim = (parent * local).inv().apply(tip - place)
-            parent = parent * local * Rotation.align_vectors([aim], [axis[joint]])[0]
-            ours = ours * Rotation.from_matrix(turns[frame, joint])
-            assert ours.apply(chains.bones[joint]) == pytest.approx(parent.apply(axis[joint]), abs=1e-6)

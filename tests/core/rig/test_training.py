@@ -12,7 +12,6 @@ torch = pytest.importorskip("torch")
 
 from neuralocks_core.progress import silent
 from neuralocks_core.reference.chains import ChainSolver
-from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig import find_chains, rig_spec
 from neuralocks_core.rig.kinematics import bone_ends, half_turns, pose_chains, skin
 from neuralocks_core.rig.rigging import HairRig
@@ -137,34 +136,6 @@ def test_turns_past_half_a_round_go_on_from_the_other_side():
     ahead = np.einsum("tij,tj->ti", heads[0, :, :3, :3] @ from_quaternion(turns), np.tile([0, 0, -1.0], (60, 1)))
     assert np.abs(ahead - [0, 0, -1]).max() < 0.05
     assert (turns[:, 0] >= 0).all() and turns[:, 0].min() < 0.05
-
-
-def test_spring_bones_rest_and_depend_on_the_frame_rate():
-    """Still in the bind pose; after the same motion at 30 and 60 fps they are elsewhere, as specified."""
-    chains = branched().chains
-    still = spring_bones(chains, np.tile(np.eye(4), (1, 20, 1, 1)), 1 / 60)
-    assert np.abs(still[..., 1:]).max() < 1e-5
-    ends = []
-    for rate in (30, 60):
-        heads = np.tile(np.eye(4), (1, rate, 1, 1))
-        heads[0, :, 0, 3] = 0.2 * np.sin(8 * np.arange(rate) / rate)
-        ends.append(spring_bones(chains, heads, 1 / rate, SpringSettings())[0, -1])
-    assert np.abs(ends[0] - ends[1]).max() > 1e-3
-
-
-def test_a_spring_bone_goes_on_as_its_specification_says():
-    """A bone that sticks out backwards and is pulled down: both frames computed by hand."""
-    who = character([("hair_1", "head", (0, 1.6, 0)), ("hair_2", "hair_1", (0, 1.6, -0.3))])
-    step, drag, stiffness, gravity = 0.1, 0.4, 1.0, 0.5
-    pull = np.array([0, 0, -1.0]) * stiffness * step + np.array([0, -1.0, 0]) * gravity * step
-    tails = [np.array([0, 0, -0.3])] * 2
-    for _ in range(2):
-        free = tails[-1] + (tails[-1] - tails[-2]) * (1 - drag) + pull
-        tails.append(0.3 * free / np.linalg.norm(free))
-    heads = np.tile(np.eye(4), (1, 2, 1, 1))
-    turns = spring_bones(find_chains(who), heads, step, SpringSettings(stiffness, drag, gravity))
-    found = from_quaternion(turns[0, :, 0]) @ [0, 0, -0.3]
-    assert found == pytest.approx(np.array(tails[2:]), abs=1e-6)
 
 
 def with_balls() -> tuple[HairRig, float]:
