@@ -81,8 +81,8 @@ def render(
         images = film.shoot(chosen, seen_from, lambda done: say(done, len(chosen), f"drawing {path.name}"))
         with closing(images):
             if still:
-                aside = [f", {angle:.0f}°" if turntable else "" for angle in seen_from]
-                _strip(part, images, [name(time) + from_there for time, from_there in zip(scene.times[chosen], aside)])
+                views = zip(scene.times[chosen], seen_from)
+                _strip(part, images, [name(time) + (f", {angle:.0f}°" if turntable else "") for time, angle in views])
             else:
                 _CLIPS[kind](part, images, len(chosen), rate)
             say(len(chosen), len(chosen), f"writing {path.name}")  # the last moment at which a caller may stop it

@@ -77,7 +77,7 @@ def motion_report(
     heads = np.stack([rig.character.canonical_to_world(j) for j in joints])
     say(1, 4, "moving spring bones, for comparison")
     fits = [SpringSettings(s, d, g) for s in (0.3, 1.0, 2.5) for d in (0.15, 0.4) for g in (0.0, 0.6)]
-    each = SpringSettings(*(np.repeat([astuple(fit)[i] for fit in fits], len(heads)) for i in range(3)))
+    each = SpringSettings(*np.repeat(np.transpose([astuple(fit) for fit in fits]), len(heads), axis=1))
     springs = np.split(spring_bones(rig.chains, np.tile(heads, (len(fits), 1, 1, 1)), 1 / RATE, each), len(fits))
     best = int(np.argmin([np.square(hair_points(rig, s) - true).sum(-1).mean() for s in springs]))
     candidates = {SPRINGS: springs[best], DEFAULTS: springs[fits.index(SpringSettings())]}

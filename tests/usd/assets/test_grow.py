@@ -187,7 +187,7 @@ def test_hair_grows_on_giants(grown, tmp_path):
 
 def test_what_cannot_grow_is_told_before_the_head_is_looked_at(tmp_path, monkeypatch):
     """That takes seconds."""
-    monkeypatch.setattr(Barber, "_obstacle", None)
+    monkeypatch.setattr("usd.assets.grow.read_rigs", None)
     with pytest.raises(NeuralocksError, match="long_straight"):
         grow("mullet", BODY, tmp_path / "x.usda")
     with pytest.raises(NeuralocksError, match="no variation -1"):
