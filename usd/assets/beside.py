@@ -77,11 +77,9 @@ def read_beside(prim: Usd.Prim, groom: Groom, notes: list[str]) -> Beside:
 
 def _read_primvars(prim: Usd.Prim, groom: Groom, notes: list[str]) -> tuple[Primvar, ...]:
     found, path = [], prim.GetPath()
-    sizes = {
-        "uniform": {groom.strand_count},
-        "vertex": {len(groom.points)},
-        "varying": _varying_sizes(UsdGeom.BasisCurves(prim), len(groom.points)),
-    }
+    varying = _varying_sizes(UsdGeom.BasisCurves(prim), len(groom.points))
+    # The schema of curves takes "faceVarying" for another word for "varying".
+    sizes = {"uniform": {groom.strand_count}, "vertex": {len(groom.points)}, "varying": varying, "faceVarying": varying}
     api = UsdGeom.PrimvarsAPI(prim)
     sized = UsdGeom.BasisCurves(prim).GetWidthsAttr().HasAuthoredValue() or api.HasPrimvar("widths")
     written = OWN + READ + ((WIDTH,) if sized else ())

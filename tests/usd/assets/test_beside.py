@@ -65,6 +65,7 @@ def test_constant_primvars_of_the_prims_above_go_on(imported):
         own.CreatePrimvar("look", names.String, "constant").Set("own")
         own.CreatePrimvar("clump", names.IntArray, "uniform").Set([7, 8, 9])
         own.CreatePrimvar("melanin", names.FloatArray, "vertex").Set(np.linspace(0, 1, 12).tolist())
+        own.CreatePrimvar("wet", names.FloatArray, "faceVarying").Set(np.linspace(1, 2, 12).tolist())
 
     prim, _stage, notes = imported(change)
     api = UsdGeom.PrimvarsAPI(prim)
@@ -73,6 +74,7 @@ def test_constant_primvars_of_the_prims_above_go_on(imported):
     assert api.GetPrimvar("look").Get() == "own" and not api.GetPrimvar("speckle")
     assert (api.GetPrimvar("clump").GetInterpolation(), list(api.GetPrimvar("clump").Get())) == ("uniform", [7, 8, 9])
     assert np.allclose(np.array(api.GetPrimvar("melanin").Get()), np.linspace(0, 1, 12)) and not notes
+    assert api.GetPrimvar("wet").GetInterpolation() == "faceVarying" and len(api.GetPrimvar("wet").Get()) == 12
     assert not any(primvar.GetPrimvarName().startswith("skel:") for primvar in api.GetPrimvars())
 
 
