@@ -26,6 +26,7 @@ import argparse
 import json
 from collections import defaultdict
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ from neuralocks_core import metrics
 from neuralocks_core.animation.random_motion import FOREIGN, KINDS, WILD, scripted_clip
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.deformation.strand_session import StrandSession
+from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.materials import Material
 from neuralocks_core.reference import simulate, stateless_floor
 from neuralocks_core.runtime import StrandModel
@@ -58,9 +60,10 @@ class Bench:
         from neuralocks_core.hairstyles import STYLES
         from usd.models.training_scene import training_scene
 
-        scene = training_scene(character_path, ["library"], seed=SEED)
+        wanted = [style for style in STYLES if not styles or style in styles]
+        scene = training_scene(character_path, wanted, seed=SEED)
         self.character = scene.character
-        self.styles = {n: g for n, g in zip(STYLES, scene.grooms) if not styles or n in styles}
+        self.styles = dict(zip(wanted, scene.grooms, strict=True))
         if grooms:
             roots = np.concatenate([g.rest[g.valid, 0] for g in scene.grooms])
             placed = on_head(grooms, scene.character, roots)
@@ -134,7 +137,7 @@ def inside(bench: Bench, points: np.ndarray, heads: np.ndarray, posed: np.ndarra
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", help="the shipped one if left out")
+    parser.add_argument("--model", help="if left out, the shipped one that suits each style")
     parser.add_argument("--static", help="a model trained without history, with the same budget")
     parser.add_argument("--character", default=CHARACTER, help="examples/shot/body.usdc if left out")
     parser.add_argument("--style", action="extend", nargs="+")
@@ -161,9 +164,10 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     bench = Bench(arguments.character, arguments.style, arguments.groom, arguments.shape)
-    models = {"network": StrandModel.load(arguments.model)}
-    if arguments.static:
-        models["static"] = StrandModel.load(arguments.static)
+    load = cache(StrandModel.load)
+    models = {style: {"network": load(arguments.model or nearest(groom))} for style, groom in bench.styles.items()}
+    for own in models.values():
+        own |= {"static": load(arguments.static)} if arguments.static else {}
     if arguments.motion:
         from usd.models.training_scene import read_clip
 
@@ -176,7 +180,7 @@ def main() -> None:
         times = np.arange(clip.start, min(clip.end, clip.start + arguments.seconds), DT)
         for style in bench.styles:
             fine = arguments.fine, Material(damping=arguments.damping)
-            rows.append(measured(bench, style, kind, clip, times, models, sessions, arguments.floor, *fine))
+            rows.append(measured(bench, style, kind, clip, times, models[style], sessions, arguments.floor, *fine))
     if arguments.json:
         print(json.dumps(rows, indent=1, default=float))
         return

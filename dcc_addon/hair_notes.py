@@ -25,3 +25,10 @@ def hair_notes(hair) -> list[str]:
     if own.armature is not None and (doubt := imported.doubt(hair)):
         found.append(doubt)
     return found
+
+
+def unnamed_model(hair) -> str:
+    """What the panel shows where a hair object names no model: that one is shipped, and which kind of hair it knows best."""
+    prepared = session.hairs.get(hair.name_full)
+    kind = prepared.hair.model.file.path.stem.partition("_")[2] if prepared is not None else ""
+    return f"Shipped with the add-on: {kind} hair" if kind else "Shipped with the add-on"

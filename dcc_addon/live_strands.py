@@ -7,6 +7,7 @@ from functools import lru_cache
 import bpy
 import numpy as np
 
+from neuralocks_core.deformation.suited import suited
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.rotation import inverse
@@ -189,7 +190,8 @@ def _recipe(hair, sampled, wanted: tuple):
 
     def make(say) -> Prepared:
         groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)
-        live = LiveHair(groom, character, load_model(path), lambda done: say(0.8 * done, 1))
+        model = load_model(str(suited(path, character, groom)))
+        live = LiveHair(groom, character, model, lambda done: say(0.8 * done, 1))
         live.follow(sampled.clip)
         live.points(*wanted)
         return Prepared(live, made_of, own, of, file)

@@ -7,7 +7,7 @@ from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP
 
-from .hair_notes import hair_notes
+from .hair_notes import hair_notes, unnamed_model
 from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
 from .scene import imported
@@ -136,7 +136,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             if own.armature is not None:
                 words(layout, f"This hair belongs to {own.armature.name_full}", "INFO")
             layout.operator("neuralocks.assign", icon="LINKED")
-        layout.prop(own, "model", **hint("Shipped with the add-on"))
+        layout.prop(own, "model", **hint(unnamed_model(hair)))
         _training(layout, settings, "strands")
         row = layout.row()
         row.scale_y = 1.5

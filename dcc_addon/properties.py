@@ -101,7 +101,7 @@ class HairSettings(bpy.types.PropertyGroup):
     )
     model: StringProperty(
         name="Model",
-        description="Trained model file (*.neuralocks); empty means the model that comes with the add-on",
+        description="Trained model file (*.neuralocks); empty means the one of those that come with the add-on that knows such hair best",
         **FILE,
         update=_model_changed,
         **OVERRIDABLE,

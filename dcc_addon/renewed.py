@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live hair that names no model moves by the one that comes with the add-on. An update may bring another one: then the hair of a
+"""Live hair that names no model moves by one of those that come with the add-on. An update may bring others: then the hair of a
 file that was saved before says so.
 """
 
 import hashlib
 from functools import cache
-from pathlib import Path
 
 import bpy
 
@@ -14,7 +13,7 @@ from neuralocks_core import model as model_file
 from .session import session
 
 NOTE = (
-    "The model that comes with the add-on is another one than when this file was saved, so this hair moves differently"
+    "The models that come with the add-on are others than when this file was saved, so this hair may move differently"
 )
 
 
@@ -40,4 +39,5 @@ def _shipped_hair() -> list:
 
 @cache
 def _checksum() -> str:
-    return hashlib.sha256(Path(model_file.shipped("strands")).read_bytes()).hexdigest()[:16]
+    files = (model_file.shipped(), *model_file.specialists())
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]

@@ -68,6 +68,12 @@ def shipped(kind: str = "strands") -> Path:
     return path
 
 
+@cache
+def specialists() -> tuple[Path, ...]:
+    """Paths of the shipped strand models that know some styles better than `shipped()`; see `deformation.suited`."""
+    return tuple(sorted((Path(__file__).parent / "shipped").glob(f"strands_*{SUFFIX}")))
+
+
 def named(path: str | os.PathLike) -> Path:
     """The path of a model file to write.
 

@@ -14,6 +14,7 @@ from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress
 from neuralocks_core.shortcomings import KEPT
+from neuralocks_core.strands.resemblance import learned_hair
 from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
@@ -156,13 +157,14 @@ class _Reporter:
 
 
 def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginning | None) -> dict:
-    """For the card: measures of the body, strands of each groom, how many of them are held out, and the source of their codes, or
-    the codes' error.
+    """For the card: measures of the body, strands of each groom, how many of them are held out, some of them, and the source of
+    their codes, or the codes' error.
     """
     lowest, highest = learned_measures(scene.character).round(4).tolist()
     strands = {"measures": {"lowest": lowest, "highest": highest}}
     strands["strands"] = [int(groom.valid.sum()) for groom in scene.grooms]
     strands[KEPT] = [kept_from_training(groom) for groom in scene.grooms]
+    strands["hair"] = learned_hair(scene.grooms)
     if beginning:
         return strands | {"began with": beginning.card()}
     errors = [1e3 * coder.errors(scalp_local(groom)[groom.valid]).mean() for groom in scene.grooms if groom.valid.any()]

@@ -4,7 +4,7 @@
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
@@ -21,6 +21,7 @@ from ..shot.recorded import given_facts
 from ..shot.stage import StageGroom
 from ..shot.wind import as_wind, in_core, wind_facts
 from .model_notes import learned, model_notes
+from .movers import Movers
 from .posing import GroomPoser
 from .procedure import BakeResult, known_notes, read_asked, write_told
 
@@ -53,7 +54,7 @@ def bake(
     Args:
         shot: path of a USD stage, or a `Shot` already read, with its grooms, skeletons, joints and cuts.
         out: `.usdc`, `.usd` or `.usda` to write.
-        model: path of a strand model, or a StrandModel; the shipped one if left out.
+        model: path of a strand model, or a StrandModel; if left out, the shipped one that suits each groom.
         grooms: prim paths; all grooms if left out.
         skeleton: prim path of the skeleton; found if left out.
         head: joint that carries the grooms that no binding assigns to a joint.
@@ -79,29 +80,39 @@ def bake(
     out = as_path(out, "out")
     check_layer_name(out)
     jobs = _jobs(jobs)
-    strand_model = model if isinstance(model, StrandModel) else StrandModel.load(model, threads=jobs)
+    movers = Movers(model, jobs)
     look = as_material(material)
     check_number("--strength", strength, 0, 4)
     blown = as_wind(wind, gusts)
-    check_felt(blown is None or strand_model.feels_wind)
+    check_felt(blown is None or movers.asked.feels_wind)
     cuts = given_cuts(cuts, loop)
     shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
-    inputs = {"model": _digest(strand_model), "material": asdict(look), "wind": blown and asdict(blown)}
+    models = movers.each(shot.grooms)
+    digests = {item.path: _digest(each) for each, items in models for item in items}
+    inputs = {"models": digests, "material": asdict(look), "wind": blown and asdict(blown)}
 
     def poser(items: list[StageGroom]) -> GroomPoser:
-        return GroomPoser(items, strand_model, look, wind=in_core(blown, shot.border), **options)
+        return GroomPoser(items, movers.of(items[0]), look, wind=in_core(blown, shot.border), **options)
 
-    facts = {"model": inputs["model"][:12], "material": asdict(look), **options, "strength": float(strength)}
-    facts |= wind_facts(blown) | given_facts(cuts, joints)
-    untrue = learned(strand_model, shot)
-    known = known_notes(shot, codes, loop, (loop or cuts is None) and strand_model.spec.bins)
+    alike = {"material": asdict(look), **options, "strength": float(strength)}
+    alike |= wind_facts(blown) | given_facts(cuts, joints)
+
+    def facts(item: StageGroom) -> dict:
+        return {"model": digests[item.path][:12], **alike}
+
+    moved = [(each, replace(shot, grooms=tuple(items))) for each, items in models]
+    untrue = {note for each in moved for note in learned(*each)}
+    known = known_notes(shot, codes, loop, (loop or cuts is None) and movers.asked.spec.bins)
     notes = [
         *(note for note in known if note not in untrue),
-        *model_notes(strand_model, look, shot, strength),
+        *dict.fromkeys(note for each, its in moved for note in model_notes(each, look, its, strength)),
     ]
-    how = {"together": True, "velocities": velocities, "blown": blown is not None, "progress": progress}
-    return write_told(notes, tell, began, shot, out, codes, poser, inputs | options, facts, **how)
+    how = {"moved_by": movers.path, "velocities": velocities, "blown": blown is not None, "progress": progress}
+    result = write_told(notes, tell, began, shot, out, codes, poser, inputs | options, facts, **how)
+    for told, item in zip(result.grooms, shot.grooms, strict=True):
+        told["model"] = movers.path(item).stem
+    return result
 
 
 def as_material(material) -> Material:

@@ -22,7 +22,7 @@ class BakeResult:
     Attributes:
         path: the override layer.
         frames: time codes in the layer.
-        grooms: per groom: path, strands, points, joint, how the joint was found.
+        grooms: per groom: path, strands, points, joint, how the joint was found, and the name of the model if there is one.
         notes: what a user should know.
         seconds: wall time.
         resumed: frames taken over from an interrupted bake, counted for each groom.

@@ -11,7 +11,7 @@ import shutil
 import traceback
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -53,9 +53,9 @@ def write_samples(
     codes: list[float],
     poser: Callable[[list[StageGroom]], Poser],
     inputs: dict,
-    facts: dict,
+    facts: Callable[[StageGroom], dict],
     *,
-    together: bool = False,
+    moved_by: Callable[[StageGroom], Hashable] | None = None,
     velocities: bool = True,
     blown: bool = False,
     progress: Progress | None = None,
@@ -68,8 +68,8 @@ def write_samples(
         codes: ascending time codes.
         poser: makes the poser of grooms; called only if something is left to compute.
         inputs: plain values that, together with the shot, its files and this program's files, determine every sample.
-        facts: what the file records about how it was made, see `recorded`.
-        together: pose the grooms of a head together, not each alone.
+        facts: what the file records about how a groom's hair was made, see `recorded`.
+        moved_by: pose the grooms of a head together for which this is the same, not each alone.
         velocities: write velocities.
         blown: whether there is a wind.
         progress: called with (done, total, message).
@@ -84,7 +84,7 @@ def write_samples(
     check_not_over(out, shot.stage)
     inputs = {**inputs, "velocities": velocities, "grooms": [_carried(item) for item in shot.grooms]}
     inputs["unsaved"] = unsaved_digest(unsaved(shot.stage))
-    batched = batches(shot.grooms) if together else [[item] for item in shot.grooms]
+    batched = batches(shot.grooms, moved_by) if moved_by else [[item] for item in shot.grooms]
     spool = Spool(out, fingerprint([*used_files(shot.stage), *program_files()], inputs))
     try:
         return _write(shot, codes, batched, poser, spool, facts, velocities, blown, progress or silent)
@@ -105,7 +105,7 @@ def _carried(item: StageGroom) -> list:
     return [item.path, found.rig.path, joints, found.to_bind.tolist(), found.rig.clip.cuts.tolist()]
 
 
-def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, velocities, blown: bool, say) -> int:
+def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts, velocities, blown: bool, say) -> int:
     plans = [[Stencils(item, codes, shot.first, velocities, blown) for item in items] for items in batched]
     uses = Uses(plans)
     there = spool.go_on(_plan(shot, spool.out, codes, facts), uses.spent)
@@ -129,7 +129,7 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
             for item, plan in zip(items, some, strict=True):
                 stores.append(_Store(spool, writer, item, plan, number, first, max(0, there - begin)))
                 begin, first = begin + len(plan.puts), first + item.point_count
-            behind.put(stores[0].open, velocities, facts)
+            behind.put(stores[0].open, velocities, facts(items[0]))
             made = None
             for code in needed[number]:
                 if uses.over(number, code, there) or spool.holds(number, code, first):
@@ -144,7 +144,7 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
                 done += len(items)
                 say(done, total, items[0].path)
             for store in stores[1:]:
-                behind.put(store.whole, velocities, facts, forget)
+                behind.put(store.whole, velocities, facts(store.item), forget)
                 done += len(needed[number])
                 say(done, total, store.item.path)
         behind.put(writer.close)
@@ -152,14 +152,16 @@ def _write(shot: Shot, codes, batched: list, poser, spool: Spool, facts: dict, v
     return resumed
 
 
-def _plan(shot: Shot, out: Path, codes: list[float], facts: dict) -> str:
+def _plan(shot: Shot, out: Path, codes: list[float], facts: Callable[[StageGroom], dict]) -> str:
     """Digest of a layer's content besides its samples, and of their time codes. A moved folder changes it, because the path to the
     shot changes, and so do recorded options that change no sample.
     """
     header = Sdf.Layer.CreateAnonymous()
     with named(out):
         write_header(header, shot.stage, shot.border, shot.path, out, codes)
-    return hashlib.sha256(repr((codes, facts, header.ExportToString())).encode()).hexdigest()
+    return hashlib.sha256(
+        repr((codes, [facts(item) for item in shot.grooms], header.ExportToString())).encode()
+    ).hexdigest()
 
 
 class _Store:

@@ -86,7 +86,7 @@ def simulate(
     facts |= wind_facts(blown) | given_facts(cuts, joints)
     notes = known_notes(shot, codes, loop, loop or cuts is None)
     how = {"blown": blown is not None, "progress": progress}
-    return write_told(notes, tell, began, shot, out, codes, poser, inputs, facts, **how)
+    return write_told(notes, tell, began, shot, out, codes, poser, inputs, lambda item: facts, **how)
 
 
 class _SimulatedPoser:

@@ -199,7 +199,8 @@ def preview_command(
 def export_command(
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.")],
     model: Annotated[
-        Path | None, typer.Argument(help="A .neuralocks file; the shipped strand model if left out.")
+        Path | None,
+        typer.Argument(help="A .neuralocks file; if left out, the shipped strand model that suits the shot's grooms."),
     ] = None,
     shot: Annotated[
         Path | None, typer.Option(help="USD stage: also write the data of its grooms that is the same in every frame.")
@@ -210,11 +211,8 @@ def export_command(
     joint: Joints = None,
 ) -> None:
     """Unpack a model into plain ONNX files and a description of their inputs."""
-    from neuralocks_core.model import shipped
-
     from ..models.export import export_model
 
-    model = model or shipped("strands")
     for path in export_model(
         model, out, shot, grooms=groom, skeleton=skeleton, head=head, joints=pairs(joint, "--joint")
     ):

@@ -59,7 +59,9 @@ Cuts = Annotated[
         help="First frames after cuts, such as 25,49, or 'none'; hair starts anew there. Detected if left out.",
     ),
 ]
-Model = Annotated[Path | None, typer.Option("--model", help="A .neuralocks file; the shipped one if left out.")]
+Model = Annotated[
+    Path | None, typer.Option("--model", help="A .neuralocks file; if left out, the shipped one that suits the groom.")
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Random seed.")]
 Jobs = Annotated[
     int | None, typer.Option("--jobs", help="Threads; if left out one per core, at most eight. The result is the same.")

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Unpack a model for other runtimes: plain ONNX files and `description.json`, which says how to feed them."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
@@ -13,6 +17,11 @@ from neuralocks_core.json_values import plain, readable
 from ..border.stopping import check
 from .description import described
 
+if TYPE_CHECKING:
+    from neuralocks_core.runtime import StrandModel
+
+    from ..shot.stage import StageGroom
+
 DESCRIPTION = "description.json"
 
 
@@ -20,7 +29,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
     """Write the graphs and `description.json` of a model file into a folder.
 
     Args:
-        model: path of a `.neuralocks` file.
+        model: path of a `.neuralocks` file; the shipped strand model if None, with a shot the one that suits its grooms.
         folder: made if it does not exist; files of an earlier export are replaced.
         shot: a USD file; the data of its grooms that is the same in every frame (`groom_tables`) is written, too.
         grooms, skeleton, head, joints: as for `bake`.
@@ -29,10 +38,10 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         The files written, `description.json` among them.
 
     Raises:
-        NeuralocksError: the model cannot be read, the folder cannot be written, or a foreign file already has the name of an
-            output.
+        NeuralocksError: the model cannot be read, the folder cannot be written, a foreign file already has the name of an
+            output, or what stops a bake of the shot.
     """
-    file = model_file.read(model)
+    file = model_file.read(model_file.shipped() if model is None else model, None if shot is None else "strands")
     folder = as_path(folder, "folder")
     if shot is None and (grooms or skeleton or head or joints):
         raise NeuralocksError(
@@ -40,6 +49,10 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         )
     if not _ours(folder / DESCRIPTION):
         raise NeuralocksError(f"{folder / DESCRIPTION}: belongs to something else; move it, or choose another folder")
+    read, mover = [], None
+    if shot is not None:
+        read, mover = _grooms(shot, model, grooms, skeleton, head, joints)
+        file = mover.file
     description, again = described(file), (folder / DESCRIPTION).exists()
     tables = {}
     with ExitStack() as all_or_none:
@@ -49,16 +62,35 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
                 raise NeuralocksError(f"{folder / name}: belongs to something else; move it, or choose another folder")
             return all_or_none.enter_context(atomic_write(folder / name))
 
-        if shot is not None:
+        if mover is not None:
             from .groom_tables import ARRAYS, export_grooms
 
-            tables = export_grooms(shot, model, put, grooms=grooms, skeleton=skeleton, head=head, joints=joints)
+            tables = export_grooms(read, mover, put)
             description["grooms"] = {"arrays": ARRAYS, "files": tables}
         files = dict(file.graphs) | {DESCRIPTION: readable(plain(description)).encode()}
         for name, data in files.items():
             put(name).write_bytes(data)
         check()
     return [folder / name for name in (*files, *tables)]
+
+
+def _grooms(shot, model, *chosen) -> tuple[Sequence[StageGroom], StrandModel]:
+    """The grooms of a shot, and the model that moves them all.
+
+    Raises:
+        NeuralocksError: the shot cannot be baked, or different shipped models suit its grooms.
+    """
+    from ..baking.movers import Movers
+    from ..shot.stage import read_shot
+
+    movers = Movers(model)
+    grooms = read_shot(shot, *chosen, still=True).grooms
+    (mover, some), *others = movers.each(grooms)
+    if others:
+        raise NeuralocksError(
+            f"{some[0].path}, {others[0][1][0].path}: different shipped models suit them; export each with --groom, or name a MODEL"
+        )
+    return grooms, mover
 
 
 def _ours(path: Path) -> bool:

@@ -6,10 +6,10 @@ vector and runs two graphs per frame, and gets the same hair as a bake.
 """
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
-from neuralocks_core import model as model_file
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession, rest_edges
@@ -18,7 +18,7 @@ from neuralocks_core.rotation import rotation_part, sizes
 from neuralocks_core.runtime import StrandModel
 
 from ..baking.placing import GroomPlacer
-from ..shot.stage import StageGroom, read_shot
+from ..shot.stage import StageGroom
 
 ARRAYS = {
     "rest": f"(S, {K}, 3) float32, the strands at rest in canonical space [m]: even in arc length of the author's, and where "
@@ -48,26 +48,21 @@ ARRAYS = {
 """Arrays of a groom's file -> what they are."""
 
 
-def export_grooms(shot, model, put, *, grooms=None, skeleton=None, head=None, joints=None) -> dict[str, dict]:
+def export_grooms(grooms: Sequence[StageGroom], model: StrandModel, put) -> dict[str, dict]:
     """Write `NAME.npz` with ARRAYS of each groom of a shot.
 
     Args:
-        shot: the USD file.
-        model: path of the strand model.
+        grooms: of the shot.
+        model: that moves them.
         put: file name -> path to write it to.
-        grooms, skeleton, head, joints: as for `bake`.
 
     Returns:
         File name -> {"prim", "skeleton": prim path, "strands", "joints": {"head": joint path, "upper chest": joint path, "pose": joint paths}}.
-
-    Raises:
-        NeuralocksError: what stops a bake of the shot.
     """
-    runner = StrandModel(model_file.read(model, "strands"))
-    read, written = read_shot(shot, grooms, skeleton, head, joints, still=True), {}
-    names = file_names([item.path for item in read.grooms])
-    for name, item in zip(names, read.grooms, strict=True):
-        arrays, joints = tables(item, runner)
+    written = {}
+    names = file_names([item.path for item in grooms])
+    for name, item in zip(names, grooms, strict=True):
+        arrays, joints = tables(item, model)
         np.savez(put(name), **arrays)
         rig = item.attachment.rig.path
         written[name] = {"prim": item.path, "skeleton": rig, "strands": len(arrays["rest"]), "joints": joints}

@@ -62,8 +62,8 @@ def training_scene(
 
     Args:
         character: a USD file with a skeleton and skinned meshes.
-        grooms: USD files with BasisCurves that lie on the character's bind pose, or "library"; the character's own if
-            none, without those of others in its file.
+        grooms: USD files with BasisCurves that lie on the character's bind pose, "library" for all styles of the library, or
+            the names of some; the character's own if none, without those of others in its file.
         motion: BVH files, or USD files that animate a skeleton; made-up motion is always added.
         skeleton: prim path of the skeleton wanted, if there are several.
         head: joint that is the head, if its name does not tell.
@@ -80,7 +80,7 @@ def training_scene(
     grooms, motion = ([words] if isinstance(words, str | Path) else words for words in (grooms, motion))
     if not 0 <= variations <= MOST_VARIATIONS:
         raise NeuralocksError(f"--variations {variations}: must be from 0 to {MOST_VARIATIONS}")
-    if variations and LIBRARY not in grooms:
+    if variations and not any(source == LIBRARY or source in STYLES for source in grooms):
         raise NeuralocksError(
             f"--variations {variations}: apply to the library's styles; add --groom {LIBRARY}, or leave it out"
         )
@@ -90,10 +90,10 @@ def training_scene(
         raise NeuralocksError(f"{rig.path}: no joint is named like a head; name it with --head JOINT")
     notes = [*first_of(rigs), *rig.notes, *unfound(rig), *unlikely_head(rig)]
     found: list[StrandSet] = []
+    if styles := [style for style in STYLES if style in grooms or LIBRARY in grooms]:
+        found += _library(rig.character, styles, seed, variations, progress or silent)
     for source in grooms or [str(character)]:
-        if source == LIBRARY:
-            found += _library(rig.character, seed, variations, progress or silent)
-        else:
+        if source != LIBRARY and source not in STYLES:
             found += _file(source, rig, head, joints, notes)
     clips = tuple(read_clip(path, rig.character, notes) for path in motion)
     scene = TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
@@ -154,12 +154,16 @@ def _own(prims, rig: StageRig, head: str | None, joints: dict[str, str] | None, 
     return [prim for prim in prims if prim not in carriers]
 
 
-def _library(character: Character, seed: int, variations: int, progress: Progress) -> list[StrandSet]:
-    barber, found, total = Barber(character), [], len(STYLES) * (1 + variations)
+def _library(
+    character: Character, styles: list[str], seed: int, variations: int, progress: Progress
+) -> list[StrandSet]:
+    """Styles, each grown as among all of them."""
+    barber, found, total = Barber(character), [], len(styles) * (1 + variations)
+    seeds = {style: seed + i for i, style in enumerate(STYLES)}
     for variation in range(1 + variations):
-        for i, style in enumerate(STYLES):
+        for style in styles:
             progress(len(found), total, f"growing {style}")
-            found.append(_strands(barber.grow(style, MOST_STRANDS, seed + i, variation), character))
+            found.append(_strands(barber.grow(style, MOST_STRANDS, seeds[style], variation), character))
     return found
 
 

@@ -8,8 +8,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress, silent
-from neuralocks_core.runtime import StrandModel
 
+from ..baking.movers import Movers
 from ..border.damage import names_damage
 from ..shot.recorded import recorded_material
 from ..shot.stage import StageGroom
@@ -37,14 +37,14 @@ def evaluate(
         baked: path of the bake, or a `Baked` already read.
         reference: simulate the same strands and compare.
         grooms, skeleton, head, joints: as for `bake`.
-        model: with `reference`, the model whose held-pose answer is shown next to it; the shipped one if left out.
+        model: with `reference`, the model whose held-pose answer is shown next to it; if left out, the shipped one that suits each groom.
         material: what the hair is made of, for energies and reference; if left out, what each groom's bake records.
         progress: called with (done, total, message).
 
     Raises:
         NeuralocksError: the file is not a bake, or the reference is not installed.
     """
-    beside = _model_beside(model) if reference else None  # before minutes of work
+    beside = _models_beside(model) if reference else None  # before minutes of work
     if not isinstance(baked, Baked):
         baked = read_baked(baked, grooms, skeleton, head, joints)
     say = progress or silent
@@ -69,7 +69,7 @@ def evaluate(
             curves[item.path] = {"times": own.times, "bake": metrics.tip_curves(subject.moved)}
             curves[item.path]["rigid"] = np.zeros_like(curves[item.path]["bake"])
             if reference and len(own.codes) >= 3:
-                rows, tips = subject.compared(look, beside)
+                rows, tips = subject.compared(look, beside and beside.of(item))
                 compared[item.path] = rows
                 curves[item.path] |= tips
     return Card(str(baked.shot.path), measured, compared, curves, tuple(notes))
@@ -101,10 +101,10 @@ def _numbered(say: Progress, first: int, last: int, count: int) -> Progress:
     return lambda done, total, message="": say(done, total, f"{which} of {count}: {message}")
 
 
-def _model_beside(given) -> StrandModel | None:
-    """The model whose held-pose answer is shown; if none is given, the shipped one, if there is one."""
+def _models_beside(given) -> Movers | None:
+    """The models whose held-pose answers are shown; if none is given, the shipped ones, if there are any."""
     try:
-        return given if isinstance(given, StrandModel) else StrandModel.load(given)
+        return Movers(given)
     except NeuralocksError:
         if given is not None:
             raise

@@ -52,10 +52,11 @@ def _curves(stage, path: str, points: np.ndarray, joint: int) -> None:
 
 
 def test_those_of_one_head_that_follow_each_other_are_together(shot, monkeypatch):
-    def names():
-        return [[item.path[-1] for item in items] for items in batches.batches(read_shot(shot).grooms)]
+    def names(moved_by=lambda item: "a model"):
+        return [[item.path[-1] for item in items] for items in batches.batches(read_shot(shot).grooms, moved_by)]
 
     assert names() == [["A", "B", "C"], ["e"]]
+    assert names(lambda item: item.path == "/Hero/A") == [["A"], ["B", "C"], ["e"]]
     monkeypatch.setattr(batches, "TOGETHER", 20)
     assert names() == [["A", "B"], ["C"], ["e"]]
 

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which of the shipped models moves a groom. One has learned all styles of the library; the others a few of them each, and those
+better. A groom that lies close to what one of these has learned is moved by it, all others by the first.
+"""
+
+import os
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from neuralocks_core import model
+from neuralocks_core.character import Character
+from neuralocks_core.groom import Groom
+from neuralocks_core.strands.resemblance import Learned
+from neuralocks_core.strands.strand_set import StrandSet, strands_on
+
+NEAR = 0.02
+"""A model knows hair of which half the strands are no farther than this [m] from the nearest that it has learned. Other grooms of
+the styles that it has learned, grown from other seeds, are within 7 to 17 mm."""
+SOME = 300
+"""So many strands tell where all are."""
+
+
+def suited(path: str | os.PathLike, character: Character, groom: Groom) -> Path:
+    """The file of the model that moves a groom: `path` itself, unless that is the shipped model; then the specialist that knows such
+    hair, if there is one. It depends on nothing but the groom at rest and the head that carries it.
+
+    Args:
+        path: the model that the user chose, or `model.shipped()`.
+        character: whose head carries the hair.
+        groom: in bind-world metres.
+    """
+    if Path(path) != model.shipped():
+        return Path(path)
+    few = np.unique(np.linspace(0, groom.strand_count - 1, SOME).astype(int))
+    return nearest(strands_on(character, groom.subset(few)))
+
+
+def nearest(strands: StrandSet) -> Path:
+    """The shipped model for these strands."""
+    far = {path: learned.distance(strands) for path, learned in _specialists().items()}
+    best = min(far, key=far.get, default=None)
+    return best if best is not None and far[best] <= NEAR else model.shipped()
+
+
+@cache
+def _specialists() -> dict[Path, Learned]:
+    """The shipped models for some styles, with what they have learned."""
+    return {path: Learned(model.read(path).meta["training"].get("hair")) for path in model.specialists()}

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which of the shipped models moves a groom."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from neuralocks_core import model
+from neuralocks_core.deformation import suited as module
+from neuralocks_core.deformation.suited import suited
+from neuralocks_core.groom import Groom
+from neuralocks_core.strands.resemblance import learned_hair
+from neuralocks_core.strands.strand_set import strands_on
+
+ORIGIN, CENTRE = np.array([0.0, 1.6, 0.0]), np.array([0.0, 0.1, 0.02])
+CHARACTER = SimpleNamespace(
+    canonical_to_bind=np.block([[np.eye(3), ORIGIN[:, None]], [0, 0, 0, 1]]), head_centre=CENTRE, facing=np.eye(3)
+)
+
+
+def _hair(length: float, seed: int = 0, aside: float = 0.0) -> Groom:
+    """500 strands that hang from a skull."""
+    direction = np.random.default_rng(seed).normal(size=(500, 3)) + [0, 1.5, 0]
+    roots = ORIGIN + CENTRE + 0.1 * direction / np.linalg.norm(direction, axis=1, keepdims=True) + [aside, 0, 0]
+    points = roots[:, None] + np.linspace(0, length, 12)[:, None] * [0, -1.0, 0]
+    return Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(500, 12))
+
+
+@pytest.fixture
+def shipped(tmp_path, monkeypatch):
+    """As if models for hair of two lengths were shipped."""
+    paths = []
+    for name, length in (("long", 0.4), ("short", 0.05)):
+        hair = learned_hair([strands_on(CHARACTER, _hair(length))])
+        meta = {"kind": "strands", "training": {"hair": hair}}
+        graphs = dict.fromkeys(model.KINDS["strands"], b"")
+        paths.append(model.write(tmp_path / f"strands_{name}.neuralocks", meta, graphs))
+    monkeypatch.setattr(model, "specialists", lambda: tuple(paths))
+    module._specialists.cache_clear()
+    yield dict(zip(("long", "short"), paths, strict=True))
+    module._specialists.cache_clear()
+
+
+def test_a_groom_gets_the_model_that_knows_such_hair(shipped):
+    for name, length in (("long", 0.4), ("short", 0.05)):
+        assert suited(model.shipped(), CHARACTER, _hair(length, seed=1)) == shipped[name]
+    assert suited(str(model.shipped()), CHARACTER, _hair(0.4, seed=1)) == shipped["long"]
+
+
+def test_other_hair_gets_the_model_that_knows_all(shipped):
+    assert suited(model.shipped(), CHARACTER, _hair(0.2)) == model.shipped()
+    far = CHARACTER, _hair(0.05, seed=1, aside=0.3)
+    assert suited(model.shipped(), *far) == model.shipped()
+    still = Groom("hair", np.zeros((4, 3), np.float32), np.array([2, 2]))
+    assert suited(model.shipped(), CHARACTER, still) == model.shipped()
+
+
+def test_a_model_that_was_chosen_stays(shipped, tmp_path):
+    assert suited(tmp_path / "mine.neuralocks", CHARACTER, _hair(0.4)) == tmp_path / "mine.neuralocks"
+
+
+def test_the_choice_does_not_depend_on_the_order_of_strands(shipped):
+    groom = _hair(0.4, seed=2)
+    assert suited(model.shipped(), CHARACTER, groom.subset(np.arange(500)[::-1])) == shipped["long"]
