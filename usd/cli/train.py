@@ -31,7 +31,9 @@ def one_by_one(words: list[str]) -> list[str]:
 def train_command(
     character: Annotated[Path, typer.Option(help="USD character: skeleton, skinned mesh, blend shapes.")],
     out: Out,
-    groom: Annotated[list[str] | None, typer.Option(help="USD grooms, or 'library' for the procedural styles.")] = None,
+    groom: Annotated[
+        list[str] | None, typer.Option(help="USD grooms, styles of the library, or 'library' for all of these.")
+    ] = None,
     motion: Annotated[
         list[str] | None, typer.Option(help="BVH or USD motions; generated motion is always added.")
     ] = None,

@@ -131,7 +131,7 @@ def described(file: model_file.ModelFile) -> dict:
     """The content of `description.json`, except for a shot's grooms."""
     with about(file.path):
         spec = BoundarySpec.from_json(file.meta.get("boundary"))
-    training = {name: value for name, value in file.meta["training"].items() if name != "curve"}
+    training = {name: value for name, value in file.meta["training"].items() if name not in ("curve", "hair")}
     result = {"units": UNITS, "graphs": _graphs(file)}
     if file.kind == "strands":
         result["boundary vector"] = {

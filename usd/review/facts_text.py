@@ -5,6 +5,9 @@ from neuralocks_core.anatomy.joint_names import leaf
 
 from ..border.told_once import grouped, told_once, without_paths
 
+LONG = {"curve": "points", "hair": "strands"}
+"""Lists of a model's card with up to thousands of items -> what these are."""
+
 
 def as_text(facts: dict, indent: int = 0) -> str:
     """The facts for a person to read; facts that differ only in their prim's path appear once."""
@@ -13,8 +16,8 @@ def as_text(facts: dict, indent: int = 0) -> str:
     for name, value in facts.items():
         if name in ("stops", "spoils"):
             continue
-        if name == "curve":  # of a long training: thousands of lines
-            lines.append(f"{pad}curve: {len(value)} points, in --json")
+        if name in LONG and isinstance(value, list):
+            lines.append(f"{pad}{name}: {len(value)} {LONG[name]}, in --json")
         elif name == "began with":  # each training records the one that it started from
             lines.append(f"{pad}trainings before this one: {_trainings(value)}, in --json")
         elif isinstance(value, dict):

@@ -63,6 +63,9 @@ def test_a_training_may_learn_from_variations_of_each_style(tmp_path, monkeypatc
     assert told == [(done, 6, f"growing {style}") for done, style in enumerate(["bob", "coils"] * 3)]
     for groom, same in zip(few, many[:2], strict=True):
         np.testing.assert_array_equal(groom.rest, same.rest)
+    (alone,) = training_scene(BODY, ["coils"]).grooms
+    np.testing.assert_array_equal(alone.rest, few[1].rest)
+    assert len(training_scene(BODY, ["coils"], variations=1).grooms) == 2
     # Training learns from what `grow --variation` gives.
     path = grow("coils", BODY, tmp_path / "coils.usda", count=40, seed=1, variation=2)
     (own,) = training_scene(BODY, [str(path)]).grooms
