@@ -11,6 +11,7 @@ per style.
 """
 
 import argparse
+from functools import cache
 
 import numpy as np
 import plain_errors  # noqa: F401
@@ -20,6 +21,7 @@ from neuralocks_core.animation.puppet import FRONT, SIDE, UP, Puppet, ease, nois
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.strand_session import StrandSession
+from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.runtime import StrandModel
 
 STYLES = ("long_straight", "wavy", "fringe", "bob")
@@ -45,7 +47,7 @@ def main() -> None:
     )
     parser.add_argument("--strands", type=int, default=300, help="of each style")
     arguments = parser.parse_args()
-    model = StrandModel.load(arguments.model)
+    load = cache(StrandModel.load)
     bench = Bench(CHARACTER, arguments.style or list(STYLES), [], None)
     if arguments.motion:
         from usd.models.training_scene import read_clip
@@ -59,6 +61,7 @@ def main() -> None:
         for style, groom in bench.styles.items():
             count = min(arguments.strands, len(groom.rest))
             chosen = np.sort(np.random.default_rng(1).permutation(len(groom.rest))[:count])
+            model = load(arguments.model or nearest(groom))
             print(f"| {name} | {style} | {measured(model, bench.character, groom, chosen, clip)} |", flush=True)
 
 

@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 import plain_errors  # noqa: F401
 
-from neuralocks_core import model
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.deformation.strand_session import StrandSession
+from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.motion import Clip
 from neuralocks_core.reference import simulate
@@ -57,12 +57,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     scene = training_scene(arguments.character, arguments.groom, seed=arguments.seed)
-    strand_model = StrandModel(model.read(arguments.model or model.shipped(), "strands"))
     print("| groom | constant | shown by | low: solver | model | default | model | high | model | effect |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     for number, groom in enumerate(scene.grooms):
         alone = replace(scene, grooms=(groom,), strands=arguments.strands, held_out=True, seed=number)
         drawn = RolloutMaker(alone).draw(0).strands
+        strand_model = StrandModel.load(arguments.model or nearest(groom))
         measured = effects(strand_model, alone, drawn, arguments.constant or list(SHOWS))
         for name, rows in measured.items():
             cells = " | ".join(f"{true:.1f} | {ours:.1f}" for true, ours in rows)

@@ -24,8 +24,8 @@ def main() -> None:
     """Print the table."""
     from neuralocks_core import metrics
     from neuralocks_core.deformation.resolve import Resolver
-    from neuralocks_core.runtime import StrandModel
     from neuralocks_core.strands.strand_set import CLAMPED
+    from usd.baking.movers import Movers
     from usd.baking.posing import GroomPoser
     from usd.review.demo import shipped_shot
     from usd.shot.stage import read_shot
@@ -35,9 +35,9 @@ def main() -> None:
     parser.add_argument("--shot", type=Path)
     parser.add_argument("--every", type=int, default=6)
     arguments = parser.parse_args()
-    model = StrandModel.load(arguments.model, threads=1)
     shot = read_shot(arguments.shot or shipped_shot())
     item = shot.grooms[0]
+    model = Movers(arguments.model, threads=1).of(item)
     rig, character = item.attachment.rig, item.attachment.character
     poser = {name: GroomPoser([item], model, resolve=name == "with") for name in ("without", "with")}
     exact = Resolver(character, poser["with"].strands, rig.clip)

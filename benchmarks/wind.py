@@ -20,6 +20,7 @@ from rig_quality import EXAMPLE
 from neuralocks_core import metrics
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.deformation.strand_session import StrandSession
+from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.motion import Clip
 from neuralocks_core.reference import simulate
 from neuralocks_core.rig import RigModel
@@ -51,21 +52,22 @@ HEAD = "| wind | motion | rigid position | position | motion error | rms | veloc
 def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", help="of strands; the shipped one if left out")
+    parser.add_argument("--model", help="of strands; if left out, the shipped one that suits each style")
     parser.add_argument("--rig", help="of the example's mesh hair; the shipped one if left out")
     parser.add_argument("--style", action="extend", nargs="+")
     parser.add_argument("--strands", type=int, default=60, help="of each style")
     arguments = parser.parse_args()
     quality.STRANDS = arguments.strands
     bench = quality.Bench(quality.CHARACTER, arguments.style or list(STYLES), [], None)
-    strands(bench, StrandModel.load(arguments.model))
+    models = {style: StrandModel.load(arguments.model or nearest(groom)) for style, groom in bench.styles.items()}
+    strands(bench, models)
     bones(RigModel.load(arguments.rig))
 
 
-def strands(bench: quality.Bench, model: StrandModel) -> None:
+def strands(bench: quality.Bench, models: dict[str, StrandModel]) -> None:
     """The table of strands."""
     print(HEAD + "\n| --- | --- |" + " ---: |" * 8)
-    sessions = {style: StrandSession(model, groom) for style, groom in bench.styles.items()}
+    sessions = {style: StrandSession(models[style], groom) for style, groom in bench.styles.items()}
     for name, mean in WINDS.items():
         for kind in KINDS:
             rows = [
