@@ -131,17 +131,19 @@ def test_inspect_tells_what_a_shot_holds(tmp_path, capsys):
     assert rig["head"].endswith("head") and abs(rig["head width [m]"] - 0.2) < 0.01 and rig["joints"] == 8
     assert rig["joint names"][3] == "hips/spine/neck/head"
     assert groom["strands"] == 40 and "Skin" in groom["carried by"] and facts["stops"] == []
+    assert groom["shipped model"] == "strands"  # which has learned more kinds of hair than the others
     assert status("inspect", shot) == 0
     text = capsys.readouterr().out
     assert "head width [m]: 0.2" in text and "joint names: hips, spine, neck, head, arm_L" in text
 
 
-def test_inspect_tells_of_a_model_what_a_person_reads(capsys):
-    shipped = Path(__file__).parents[3] / "neuralocks_core" / "shipped" / "strands.neuralocks"
-    assert status("inspect", shipped) == 0
+@pytest.mark.parametrize("path", [model_file.shipped(), *model_file.specialists()], ids=lambda path: path.stem)
+def test_inspect_tells_of_a_model_what_a_person_reads(path, capsys):
+    assert status("inspect", path) == 0
     text = capsys.readouterr().out
     assert "inputs of the body" in text and text.count("\n") < 150  # the curve alone has 200 points
     assert "trainings before this one: " in text and "began with:" not in text
+    assert ("hair: " in text) == (path in model_file.specialists()) and max(map(len, text.splitlines())) < 1500
 
 
 def test_inspect_tells_of_a_model_that_moves_hair_worse_than_not_at_all(tmp_path, capsys):
