@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Put the measurements of docs/ablations.md, by hairstyle and on real grooms, into the card in a model file.
 
-    python benchmarks/card.py neuralocks_core/shipped/strands.neuralocks
+    python benchmarks/card.py MODEL [NAME ...]
 
+Each of the shipped models moves other hair: NAME is a row of the tables, a hairstyle or a groom; without any, all rows are its own.
 The card also says in words which hair the model does not get right: motion error over 0.6, position error over 5 % of
 length, sliders off the solver's effect by more than 30 %. Only the card changes; the graphs stay the same, byte for byte.
 `neuralocks inspect MODEL` prints it.
@@ -16,7 +17,7 @@ from pathlib import Path
 from neuralocks_core import model
 
 DOCS = Path(__file__).resolve().parents[1] / "docs/ablations.md"
-STYLES, GROOMS, SLIDERS = "The shipped model, by hairstyle", "Real grooms in the shipped shot", "Materials, by style"
+STYLES, GROOMS, SLIDERS = "The shipped models, by hairstyle", "Real grooms in the shipped shot", "Materials, by style"
 """Headings of the tables."""
 MOTION, POSITION, OFF = 0.6, 5.0, 0.3
 
@@ -25,26 +26,32 @@ def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", type=Path)
-    path = parser.parse_args().model
-    file = model.read(path, "strands")
-    meta = {**file.meta, "report": {**file.meta["report"], **measured(DOCS.read_text(encoding="utf-8"))}}
-    model.write(path, meta, file.graphs)
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    arguments = parser.parse_args()
+    file = model.read(arguments.model, "strands")
+    found = measured(DOCS.read_text(encoding="utf-8"), arguments.names)
+    meta = {**file.meta, "report": {**file.meta["report"], **found}}
+    model.write(arguments.model, meta, file.graphs)
     print("\n".join(meta["report"]["falls short"]))
 
 
-def measured(text: str) -> dict:
-    """The card's part of the tables in a Markdown text."""
+def measured(text: str, names=()) -> dict:
+    """The card's part of the tables in a Markdown text; all rows, or only those with one of these names."""
+    styles, grooms, sliders = (
+        {name: row for name, row in table(text, heading).items() if not names or name in names}
+        for heading in (STYLES, GROOMS, SLIDERS)
+    )
     styles, grooms = (
         {
             name: {"position": row["position"], "motion": row["motion, median"], "inside": row["inside %"]}
-            for name, row in table(text, heading).items()
+            for name, row in rows.items()
         }
-        for heading in (STYLES, GROOMS)
+        for rows in (styles, grooms)
     )
     return {
         "by style": styles,
         "real grooms": grooms,
-        "falls short": [*_errors({**styles, **grooms}), *_sliders(table(text, SLIDERS))],
+        "falls short": [*_errors({**styles, **grooms}), *_sliders(sliders)],
     }
 
 

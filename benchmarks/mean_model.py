@@ -2,11 +2,13 @@
 """The mean of a model and of one that started from it: often better than both, if a longer training with larger steps has
 left the valley of the first.
 
-    python benchmarks/mean_model.py MODEL BEGUN SHARE [--damping FACTOR] -o OUT
+    python benchmarks/mean_model.py MODEL BEGUN SHARE [--damping FACTOR] [--without GROOM ...] -o OUT
 
 SHARE is the share of BEGUN, from 0 to 1. Both share their strand codes, which stay. With `--damping`, MODEL is first made to
 take so many times the damping for what it is told: a model that learned from a solver whose steps damp, before it is mixed
-with one that did not. The card is that of BEGUN and says so, without the measurements of BEGUN.
+with one that did not. The card is that of BEGUN and says so, without the measurements of BEGUN. With `--without`, the card
+does not tell of the hair of some grooms, by their numbers in the training of BEGUN, from 0 on: for those that another shipped
+model moves better, so that hair like it does not get this one (`deformation/suited.py`).
 """
 
 from __future__ import annotations
@@ -29,12 +31,15 @@ def main() -> None:
     parser.add_argument("begun", type=Path)
     parser.add_argument("share", type=float)
     parser.add_argument("--damping", type=float, default=1.0)
+    parser.add_argument("--without", type=int, nargs="+", default=[], metavar="GROOM")
     parser.add_argument("-o", "--out", type=Path, required=True)
     print(mean(**vars(parser.parse_args())))
 
 
-def mean(model: Path, begun: Path, share: float, damping: float, out: Path) -> Path:
-    """Write the model whose weights are (1 - share) of `model`'s, at so many times its damping, and `share` of `begun`'s."""
+def mean(model: Path, begun: Path, share: float, damping: float, without: list[int], out: Path) -> Path:
+    """Write the model whose weights are (1 - share) of `model`'s, at so many times its damping, and `share` of `begun`'s; its card
+    does not tell of the hair of the grooms `without`.
+    """
     from neuralocks_core import model as model_file
     from neuralocks_core.boundary_spec import BoundarySpec
     from neuralocks_core.training.beginning import Beginning
@@ -58,6 +63,9 @@ def mean(model: Path, begun: Path, share: float, damping: float, out: Path) -> P
             ours.lerp_(theirs, share)
     began = "those that it began with" + (f", at {damping:g} times their damping" if damping != 1 else "")
     training = {**meta["training"], "mean": f"{share:g} of these weights, {1 - share:g} of {began}"}
+    if without:
+        each = len(training["hair"]) // len(training["strands"])  # a card holds as many strands of each groom
+        training["hair"] = [row for i, row in enumerate(training["hair"]) if i // each not in without]
     graphs = strand_graphs(Beginning(begun).coder(), first, meta["output"])
     return model_file.write(out, {**meta, "training": training, "report": {}}, graphs)
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist should know about a hair object, in the words of the panel."""
 
+from neuralocks_core.model import kind_known
+
 from .renewed import NOTE
 from .scene import imported
 from .scene.muting import off_meanwhile
@@ -30,5 +32,5 @@ def hair_notes(hair) -> list[str]:
 def unnamed_model(hair) -> str:
     """What the panel shows where a hair object names no model: that one is shipped, and which kind of hair it knows best."""
     prepared = session.hairs.get(hair.name_full)
-    kind = prepared.hair.model.file.path.stem.partition("_")[2] if prepared is not None else ""
+    kind = kind_known(prepared.hair.model.file.path) if prepared is not None else ""
     return f"Shipped with the add-on: {kind} hair" if kind else "Shipped with the add-on"

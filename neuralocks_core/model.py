@@ -74,6 +74,11 @@ def specialists() -> tuple[Path, ...]:
     return tuple(sorted((Path(__file__).parent / "shipped").glob(f"strands_*{SUFFIX}")))
 
 
+def kind_known(path: Path) -> str:
+    """The kind of hair that one of `specialists()` knows, such as "short"; "" for any other model."""
+    return path.stem.partition("_")[2] if path in specialists() else ""
+
+
 def named(path: str | os.PathLike) -> Path:
     """The path of a model file to write.
 

@@ -16,8 +16,8 @@ from neuralocks_core.strands.resemblance import Learned
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
 
 NEAR = 0.02
-"""A model knows hair of which half the strands are no farther than this [m] from the nearest that it has learned. Other grooms of
-the styles that it has learned, grown from other seeds, are within 7 to 17 mm."""
+"""A model knows hair of which half the strands are no farther than this [m] from the nearest that it has learned. Grooms of its
+styles from other seeds, and variations of them, are 8 to 19 mm away."""
 SOME = 300
 """So many strands tell where all are."""
 

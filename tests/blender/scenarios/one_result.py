@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from dcc_addon.hair_notes import unnamed_model
 from tests.blender import scenes
 from tests.blender.checks import (
     MODEL,
@@ -304,3 +305,4 @@ def shipped_shot(folder: Path) -> None:
     y_up = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     for frame in (90, 40):
         assert apart(points_at(strands, frame), baked_points(out, "/Body/Hair", frame) @ y_up.T) < SAME
+    assert unnamed_model(strands) == "Shipped with the add-on"  # the one for all styles

@@ -10,6 +10,7 @@ from neuralocks_core import model
 from neuralocks_core.deformation import suited as module
 from neuralocks_core.deformation.suited import suited
 from neuralocks_core.groom import Groom
+from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.resemblance import learned_hair
 from neuralocks_core.strands.strand_set import strands_on
 
@@ -63,3 +64,17 @@ def test_a_model_that_was_chosen_stays(shipped, tmp_path):
 def test_the_choice_does_not_depend_on_the_order_of_strands(shipped):
     groom = _hair(0.4, seed=2)
     assert suited(model.shipped(), CHARACTER, groom.subset(np.arange(500)[::-1])) == shipped["long"]
+
+
+def test_a_specialist_is_called_by_the_hair_that_it_knows(shipped):
+    assert [model.kind_known(path) for path in (shipped["long"], model.shipped())] == ["long", ""]
+    assert model.kind_known(model.Path("my_short.neuralocks")) == ""
+
+
+def test_the_shipped_ones_can_stand_in_for_each_other():
+    """Whichever of them moves a groom, cuts, wind and held poses mean the same."""
+    first, *others = (StrandModel.load(path) for path in (model.shipped(), *model.specialists()))
+    assert len(others) == 3 and first.feels_wind
+    for other in others:
+        assert other.spec == first.spec and other.feels_wind and other.anchored == first.anchored
+        assert other.file.meta["credits"] and not other.file.shortcomings()

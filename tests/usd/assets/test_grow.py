@@ -9,8 +9,11 @@ import pytest
 import trimesh
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
+from neuralocks_core import model
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.deformation.suited import suited
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.rotation import from_vector, transformed
 from usd.assets.grow import Barber, grow
 from usd.assets.importing import import_groom
@@ -70,6 +73,20 @@ def test_a_training_may_learn_from_variations_of_each_style(tmp_path, monkeypatc
     path = grow("coils", BODY, tmp_path / "coils.usda", count=40, seed=1, variation=2)
     (own,) = training_scene(BODY, [str(path)]).grooms
     np.testing.assert_allclose(own.rest, many[5].rest, atol=1e-6)
+
+
+def test_each_style_moves_by_the_model_that_moves_it_best():
+    """Grown from a seed that no training had."""
+    character = read_rigs(BODY)[0].character
+    barber = Barber(character)
+    kinds = {s: suited(model.shipped(), character, barber.grow(s, 300, seed=7001)).stem for s in STYLES}
+    learned = {
+        "strands": ["long_straight", "wavy", "fringe", "tight_curls", "braid"],
+        "strands_short": ["bob", "pixie", "mohawk"],
+        "strands_curly": ["coils", "afro"],
+        "strands_tied": ["ponytail", "bun"],
+    }
+    assert kinds == {style: kind for kind, styles in learned.items() for style in styles}
 
 
 def test_variations_are_of_a_style_of_the_library(tmp_path):
