@@ -11,6 +11,7 @@ import numpy as np
 
 from neuralocks_core import model
 from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.resemblance import Learned
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
@@ -47,4 +48,12 @@ def nearest(strands: StrandSet) -> Path:
 @cache
 def _specialists() -> dict[Path, Learned]:
     """The shipped models for some styles, with what they have learned."""
-    return {path: Learned(model.read(path).meta["training"].get("hair")) for path in model.specialists()}
+    return {path: _learned(path) for path in model.specialists()}
+
+
+def _learned(path: Path) -> Learned:
+    told = model.read(path, "strands").meta["training"].get("hair")
+    try:
+        return Learned(told)
+    except ValueError:
+        raise NeuralocksError(f"{path}: does not tell which hair it knows; install neuralocks again") from None

@@ -11,7 +11,7 @@ from neuralocks_core.strands.strand_set import StrandSet
 LOOKED_AT = (0, 3, 6, 9, 12, 15, 19, 23)
 """Vertices of a strand that tell where it lies and how it winds."""
 KEPT = 1000
-"""Strands in a model's card, at most: 70 kB of text."""
+"""Strands in a model's card, at most: 85 kB of text."""
 LARGEST = 10_000
 """Millimetres, and strands, that a card may hold: it comes from a file."""
 

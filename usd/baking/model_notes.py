@@ -47,10 +47,8 @@ def _other_bodies(model: StrandModel, shot: Shot) -> list[str]:
     """The notes on characters whose measures differ from those that a model was trained on."""
     found = [item.attachment for item in shot.grooms]
     on_heads = {each.rig.path: each for each in found if not off_head(each)}  # a chest does not have a head's measures
-    own, remedy = (
-        model.file.path in (shipped(), *specialists()),
-        "use the shipped model, or train one on this character",
-    )
+    own = model.file.path in (shipped(), *specialists())
+    remedy = "use the shipped model, or train one on this character"
     if own:  # of those whose size no model knows, the shot's notes tell
         on_heads = {path: each for path, each in on_heads.items() if not untrained(_with_head(each))}
         remedy = "train one on this character"

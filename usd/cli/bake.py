@@ -150,7 +150,7 @@ def _bake_report(result, as_json: bool) -> None:
         )
         return
     for groom in result.grooms:
-        by = f", moved by {groom['model']}" if "model" in groom else ""
+        by = f", moved by the model {groom['model']}" if "model" in groom else ""
         typer.echo(f"{groom['path']}: {groom['strands']} strands, carried by {groom['how']}{by}")
     taken = f", {result.resumed} taken over from an interrupted bake" if result.resumed else ""
     typer.echo(f"{result.path}: {_span(result.frames)} in {result.seconds:.1f} s{taken}")

@@ -9,6 +9,7 @@ import pytest
 from neuralocks_core import model
 from neuralocks_core.deformation import suited as module
 from neuralocks_core.deformation.suited import suited
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.resemblance import learned_hair
@@ -64,6 +65,13 @@ def test_a_model_that_was_chosen_stays(shipped, tmp_path):
 def test_the_choice_does_not_depend_on_the_order_of_strands(shipped):
     groom = _hair(0.4, seed=2)
     assert suited(model.shipped(), CHARACTER, groom.subset(np.arange(500)[::-1])) == shipped["long"]
+
+
+def test_a_specialist_without_its_hair_is_named(shipped):
+    file = model.read(shipped["long"])
+    model.write(shipped["long"], {**file.meta, "training": {}}, file.graphs)
+    with pytest.raises(NeuralocksError, match="strands_long.neuralocks: does not tell which hair it knows; install"):
+        suited(model.shipped(), CHARACTER, _hair(0.4))
 
 
 def test_a_specialist_is_called_by_the_hair_that_it_knows(shipped):
