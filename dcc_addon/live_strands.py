@@ -20,8 +20,9 @@ from .pose import pose
 from .scene import curves
 from .scene.layers import graph_of, layer_of
 from .scene.lively import lively
-from .scene.lookup import check_found, find, identity, in_scene
+from .scene.lookup import find, identity, in_scene
 from .scene.muting import mute_deformers, unmute_deformers
+from .scene.paths import check_found
 from .scene.placing import world
 from .scene.sampling import shown_frame
 from .scene.watched import evaluated_for_itself

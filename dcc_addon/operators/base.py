@@ -12,8 +12,8 @@ from neuralocks_core.time_left import TimeLeft
 
 from .. import background
 from ..live import refresh
-from ..scene.lookup import check_found, in_scene
-from ..scene.paths import FILE
+from ..scene.lookup import in_scene
+from ..scene.paths import FILE, check_found
 from ..scene.sampling import in_slices
 from ..services.panel_errors import for_the_panel
 from ..services.remaining import in_words

@@ -5,7 +5,7 @@ import numpy as np
 
 from ..services import names
 from ..services.rig import RigArrays
-from .lookup import check_found
+from .paths import check_found
 from .skinned import bones_with_skin
 
 

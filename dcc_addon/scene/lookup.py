@@ -45,17 +45,3 @@ def named(name_full: str):
     if thing is None:
         raise NeuralocksError(f"{name_full}: it was deleted or renamed meanwhile; start again")
     return thing
-
-
-def check_found(thing) -> None:
-    """Refuse an object from a library file that Blender did not find: what stands in its place is empty.
-
-    Raises:
-        NeuralocksError: it is one.
-    """
-    source = thing.override_library.reference if thing.override_library else thing
-    if getattr(source, "is_missing", False):  # older Blenders do not tell
-        raise NeuralocksError(
-            f"{thing.name_full}: its file {source.library.filepath} was not found when this file was opened; put it back and open "
-            "this file again, or relocate the library in the Outliner (Blender File)"
-        )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files as properties name them."""
+"""Files as properties name them, and libraries whose file is missing."""
 
 import bpy
 
@@ -39,3 +39,17 @@ def library_of(thing, setting: str):
             break
         thing = override.reference
     return thing.library
+
+
+def check_found(thing) -> None:
+    """Refuse an object from a library file that Blender did not find: what stands in its place is empty.
+
+    Raises:
+        NeuralocksError: it is one.
+    """
+    source = thing.override_library.reference if thing.override_library else thing
+    if getattr(source, "is_missing", False):  # older Blenders do not tell
+        raise NeuralocksError(
+            f"{thing.name_full}: its file {source.library.filepath} was not found when this file was opened; put it back and open "
+            "this file again, or relocate the library in the Outliner (Blender File)"
+        )
