@@ -185,13 +185,14 @@ def _recipe(hair, sampled, wanted: tuple):
     name, data, path, character = hair.name_full, hair.data, model_path(hair), sampled.carrying(hair.name_full)
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
     radius, of = curves.radius(data), _which(hair)
+    named = path if hair.neuralocks_hair.model.strip() else None
     # The hair keeps its character alive, so no other one gets its id.
     file = path, stamp(path)
-    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, id(character)
+    made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, named, id(character)
 
     def make(say) -> Prepared:
         groom = rig_service.groom(name, own, counts, place, sampled.bind_metres, radius)
-        model = load_model(str(suited(path, character, groom)))
+        model = load_model(str(suited(named, character, groom)))
         live = LiveHair(groom, character, model, lambda done: say(0.8 * done, 1))
         live.follow(sampled.clip)
         live.points(*wanted)

@@ -19,7 +19,8 @@ class Look(NamedTuple):
     material: tuple[str, ...]
     motion: float
     resolve: bool
-    model: str
+    model: str | None
+    """None if the hair names none."""
     blowing: Blowing
 
 
@@ -59,4 +60,5 @@ def _look(hair) -> Look:
     settings = hair.neuralocks_hair
     path = model_path(hair)
     wind = blowing(settings.armature) if load_model(path).feels_wind else Blowing()
-    return Look(tuple(material_words(settings)), typed(settings, MOTION.name), settings.resolve, path, wind)
+    named = path if settings.model.strip() else None
+    return Look(tuple(material_words(settings)), typed(settings, MOTION.name), settings.resolve, named, wind)

@@ -7,13 +7,11 @@ import os
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
 from neuralocks_core import model
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
-from neuralocks_core.strands.resemblance import Learned
+from neuralocks_core.strands.resemblance import Learned, spread
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
 
 NEAR = 0.02
@@ -23,19 +21,18 @@ SOME = 300
 """So many strands tell where all are."""
 
 
-def suited(path: str | os.PathLike, character: Character, groom: Groom) -> Path:
-    """The file of the model that moves a groom: `path` itself, unless that is the shipped model; then the specialist that knows such
-    hair, if there is one. It depends on nothing but the groom at rest and the head that carries it.
+def suited(path: str | os.PathLike | None, character: Character, groom: Groom) -> Path:
+    """The file of the model that moves a groom: the one named, else the shipped one that knows such hair best. It depends on nothing
+    but the groom at rest and the head that carries it.
 
     Args:
-        path: the model that the user chose, or `model.shipped()`.
+        path: the model that the user named, in whatever spelling; None if there is none.
         character: whose head carries the hair.
         groom: in bind-world metres.
     """
-    if Path(path) != model.shipped():
+    if path is not None:
         return Path(path)
-    few = np.unique(np.linspace(0, groom.strand_count - 1, SOME).astype(int))
-    return nearest(strands_on(character, groom.subset(few)))
+    return nearest(strands_on(character, groom.subset(spread(groom.strand_count, SOME))))
 
 
 def nearest(strands: StrandSet) -> Path:

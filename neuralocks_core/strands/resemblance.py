@@ -21,7 +21,7 @@ def learned_hair(grooms: Sequence[StrandSet]) -> list[str]:
     centre, canonical space, as text, since a number a line would be ten times as long.
     """
     each = max(1, KEPT // max(1, len(grooms)))
-    places = np.concatenate([_places(groom)[_spread(int(groom.valid.sum()), each)] for groom in grooms])
+    places = np.concatenate([_places(groom)[spread(int(groom.valid.sum()), each)] for groom in grooms])
     return [" ".join(map(str, row)) for row in np.round(1000 * places).astype(int)]
 
 
@@ -38,7 +38,10 @@ class Learned:
     def __init__(self, told):
         if not isinstance(told, list) or not 0 < len(told) <= LARGEST or not all(isinstance(row, str) for row in told):
             raise ValueError("no strands")
-        places = np.array([[int(word) for word in row.split()] for row in told]) / 1000.0
+        try:
+            places = np.array([[int(word) for word in row.split()] for row in told], float) / 1000
+        except OverflowError:
+            raise ValueError("no strands") from None
         if places.shape != (len(told), 3 * len(LOOKED_AT)) or np.abs(places).max() > LARGEST / 1000:
             raise ValueError("no strands")
         self._tree = cKDTree(places)
@@ -59,6 +62,6 @@ def _places(strands: StrandSet) -> np.ndarray:
     return rest.reshape(len(rest), 3 * len(LOOKED_AT)).astype(float)
 
 
-def _spread(count: int, wanted: int) -> np.ndarray:
+def spread(count: int, wanted: int) -> np.ndarray:
     """Indices of at most so many of `count` things, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, wanted)).astype(int)) if count else np.zeros(0, int)

@@ -25,17 +25,15 @@ class Movers:
 
     def __init__(self, given: str | os.PathLike | StrandModel | None = None, threads: int | None = None):
         self._load = cache(lambda path: StrandModel.load(path, threads))
-        self._forced = isinstance(given, StrandModel)
-        self.asked = given if self._forced else StrandModel.load(given, threads)
+        self.asked = given if isinstance(given, StrandModel) else StrandModel.load(given, threads)
         """The one asked for; the shipped one that knows all styles if none was. All shipped ones read the same motion."""
+        self._named = None if given is None else self.asked.file.path
         self._paths: dict[str, Path] = {}
 
     def path(self, item: StageGroom) -> Path:
         """The file of the model of a groom."""
-        if self._forced:
-            return self.asked.file.path
         if item.path not in self._paths:
-            self._paths[item.path] = suited(self.asked.file.path, item.attachment.character, item.groom)
+            self._paths[item.path] = suited(self._named, item.attachment.character, item.groom)
         return self._paths[item.path]
 
     def of(self, item: StageGroom) -> StrandModel:

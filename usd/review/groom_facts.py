@@ -4,7 +4,6 @@
 import numpy as np
 from pxr import UsdGeom
 
-from neuralocks_core import model
 from neuralocks_core.deformation.suited import suited
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
@@ -80,7 +79,7 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     if beyond is not None:
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
     if joint:
-        joint["shipped model"] = suited(model.shipped(), found.character, groom).stem
+        joint["shipped model"] = suited(None, found.character, groom).stem
         spoils += groom_notes(prim, groom, border)
     if found:
         spoils += baked_from_others(prim, found, groom)

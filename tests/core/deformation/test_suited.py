@@ -46,32 +46,32 @@ def shipped(tmp_path, monkeypatch):
 
 def test_a_groom_gets_the_model_that_knows_such_hair(shipped):
     for name, length in (("long", 0.4), ("short", 0.05)):
-        assert suited(model.shipped(), CHARACTER, _hair(length, seed=1)) == shipped[name]
-    assert suited(str(model.shipped()), CHARACTER, _hair(0.4, seed=1)) == shipped["long"]
+        assert suited(None, CHARACTER, _hair(length, seed=1)) == shipped[name]
 
 
 def test_other_hair_gets_the_model_that_knows_all(shipped):
-    assert suited(model.shipped(), CHARACTER, _hair(0.2)) == model.shipped()
+    assert suited(None, CHARACTER, _hair(0.2)) == model.shipped()
     far = CHARACTER, _hair(0.05, seed=1, aside=0.3)
-    assert suited(model.shipped(), *far) == model.shipped()
+    assert suited(None, *far) == model.shipped()
     still = Groom("hair", np.zeros((4, 3), np.float32), np.array([2, 2]))
-    assert suited(model.shipped(), CHARACTER, still) == model.shipped()
+    assert suited(None, CHARACTER, still) == model.shipped()
 
 
 def test_a_model_that_was_chosen_stays(shipped, tmp_path):
-    assert suited(tmp_path / "mine.neuralocks", CHARACTER, _hair(0.4)) == tmp_path / "mine.neuralocks"
+    for named in (tmp_path / "mine.neuralocks", model.shipped()):  # also the one for all hair
+        assert suited(named, CHARACTER, _hair(0.4)) == named
 
 
 def test_the_choice_does_not_depend_on_the_order_of_strands(shipped):
     groom = _hair(0.4, seed=2)
-    assert suited(model.shipped(), CHARACTER, groom.subset(np.arange(500)[::-1])) == shipped["long"]
+    assert suited(None, CHARACTER, groom.subset(np.arange(500)[::-1])) == shipped["long"]
 
 
 def test_a_specialist_without_its_hair_is_named(shipped):
     file = model.read(shipped["long"])
     model.write(shipped["long"], {**file.meta, "training": {}}, file.graphs)
     with pytest.raises(NeuralocksError, match="strands_long.neuralocks: does not tell which hair it knows; install"):
-        suited(model.shipped(), CHARACTER, _hair(0.4))
+        suited(None, CHARACTER, _hair(0.4))
 
 
 def test_a_specialist_is_called_by_the_hair_that_it_knows(shipped):

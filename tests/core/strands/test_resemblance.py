@@ -58,6 +58,7 @@ def test_hair_without_length_is_like_nothing():
         ["1e9 " * 24],
         ["1 " * 24] * 10_001,
         [str(10**9) + " 0" * 23],
+        [str(10**400) + " 0" * 23],
     ],
 )
 def test_a_card_may_hold_anything(told):

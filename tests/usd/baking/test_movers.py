@@ -35,6 +35,8 @@ def suits(monkeypatch, model, still_model):
     """As if a shipped model that never moves hair suited the one groom, and a lively one the other."""
 
     def suited(path, character, groom):
+        if path is not None:
+            return path
         return still_model if groom.name == HAIR else model
 
     monkeypatch.setattr(movers, "suited", suited)
@@ -56,6 +58,11 @@ def test_each_groom_moves_by_its_own(shot, tmp_path, suits, model, still_model):
 def test_a_part_of_the_grooms_moves_as_all_do(shot, tmp_path, suits):
     both, part = (bake(shot, tmp_path / f"{n}.usdc", grooms=n and [OTHER]).path for n in (0, 1))
     np.testing.assert_array_equal(*(samples(path, "points", at=5.0, prim=OTHER) for path in (both, part)))
+
+
+def test_the_shipped_model_moves_all_where_it_is_named(shot, suits):
+    (used,) = movers.Movers(str(model_file.shipped())).each(read_shot(shot).grooms)
+    assert used[0].file.path == model_file.shipped() and len(used[1]) == 2
 
 
 def test_a_model_in_memory_moves_all(shot, suits, model):
