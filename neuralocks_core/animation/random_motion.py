@@ -19,6 +19,8 @@ WILD = ("spin", "tumble")
 """Rarer and farther from standing: dancing and falling, which models learn, but are evaluated on only if asked."""
 FOREIGN = ("bang",)
 """Headbanging, which no random clip contains: how a model responds to motion unlike its training."""
+MOST_WEIGHT = 100
+"""Of a gesture among random ones, relative to each other one."""
 REST = 0.3
 """[s] A random clip begins motionless, so that its hair correctly begins at rest."""
 
@@ -30,6 +32,7 @@ def random_clip(
     rate: float = 30.0,
     shape: np.ndarray | None = None,
     wild: float = 0.2,
+    weights: dict[str, float] | None = None,
 ) -> Clip:
     """A random motion of one to three gestures over swaying and posture; in a share of them the whole body spins or tumbles.
 
@@ -40,10 +43,11 @@ def random_clip(
         rate: samples a second.
         shape: blend shape weights (B,).
         wild: the share in which the whole body spins or tumbles.
+        weights: how often gestures are chosen, relative to all others, which have 1: see `check_weights`.
     """
     times = np.arange(round(seconds * rate) + 1) / rate
     puppet = Puppet(character, times)
-    chosen = rng.choice(KINDS, size=int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2])))
+    chosen = rng.choice(KINDS, size=int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2])), p=_odds(weights or {}))
     _posture(puppet, rng)
     if "hold" not in chosen and rng.random() < 0.4:
         _fidget(puppet, rng)
@@ -65,6 +69,30 @@ def scripted_clip(character: Character, kind: str, seconds: float = 5.0, rate: f
     puppet = Puppet(character, times)
     _GESTURES[kind](puppet, _Dice(None, seconds))
     return puppet.clip()
+
+
+def check_weights(weights: dict[str, float]) -> dict[str, float]:
+    """How often gestures are chosen: each a kind of KINDS with a weight from 0 to MOST_WEIGHT, not all of them 0.
+
+    Raises:
+        NeuralocksError: they are not.
+    """
+    for kind, weight in weights.items():
+        if kind not in KINDS:
+            raise NeuralocksError(f"--gesture {kind}: unknown kind of motion; use {', '.join(KINDS)}")
+        if not 0 <= weight <= MOST_WEIGHT:
+            raise NeuralocksError(f"--gesture {kind}={weight:g}: must be from 0 to {MOST_WEIGHT}")
+    if not any(weights.get(kind, 1.0) for kind in KINDS):
+        raise NeuralocksError("--gesture: leaves no kind of motion; give one of them more than 0")
+    return weights
+
+
+def _odds(weights: dict[str, float]) -> np.ndarray | None:
+    """The chance of each of KINDS; None if they are alike, so that the same random numbers choose as without weights."""
+    if not weights:
+        return None
+    each = np.array([weights.get(kind, 1.0) for kind in KINDS])
+    return each / each.sum()
 
 
 class _Dice:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.animation.random_motion import check_weights, random_clip
 from neuralocks_core.boundary import BoundarySampler, joints_read
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
@@ -48,6 +49,7 @@ class TrainingScene:
         seed: of all random choices.
         frames: length of a rollout, in steps of `spec.dt`.
         strands: strands of a rollout, in whole locks.
+        gestures: how often random motion has each of its gestures, as `random_motion.check_weights` takes it.
         held_out: draw what training never sees: other locks, other random numbers, and no `clips`, since training cuts from all
             of each.
     """
@@ -59,7 +61,11 @@ class TrainingScene:
     seed: int = 0
     frames: int = 110
     strands: int = 64
+    gestures: dict[str, float] = field(default_factory=dict)
     held_out: bool = False
+
+    def __post_init__(self):
+        check_weights(self.gestures)
 
     @property
     def span(self) -> float:
@@ -230,15 +236,13 @@ class RolloutMaker:
         return rng.uniform(-1, 1, count) * rng.choice([0.0, SHAPES])
 
     def _motion(self, rng, shape) -> tuple[Clip, np.ndarray, int]:
-        from neuralocks_core.animation.random_motion import random_clip
-
         scene, clips, span = self.scene, self._captured, self.scene.span
         if clips and rng.random() < 0.35:
             source = clips[rng.integers(len(clips))]
             start = rng.uniform(source.start, max(source.start, source.end - span))
             clip, first = Clip(source.times, source.joints, np.tile(shape, (len(source.times), 1))), PREROLL
         else:
-            clip = random_clip(scene.character, rng, span, shape=shape)
+            clip = random_clip(scene.character, rng, span, shape=shape, weights=scene.gestures)
             start, first = clip.start, 1
         return clip, start + scene.spec.dt * np.arange(scene.frames), first
 

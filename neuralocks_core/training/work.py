@@ -125,7 +125,9 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
     if resume and file.exists():
         try:
             # what inputs without these names were made with
-            before = {"integrator": "implicit Euler", "material": "as it is"} | json.loads(file.read_text("utf-8"))
+            before = {"integrator": "implicit Euler", "material": "as it is", "gesture": {}} | json.loads(
+                file.read_text("utf-8")
+            )
             changed = [name for name in now if before[name] != now[name]]
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise NeuralocksError(f"{file}: cannot be read; train without --resume") from None
@@ -162,6 +164,7 @@ def _inputs(scene: TrainingScene) -> dict:
             ]
         ),
         "groom": _digest([groom.rest for groom in scene.grooms]),
+        "gesture": scene.gestures,
         "motion": _digest([array for clip in clips for array in (clip.times, clip.joints, clip.shape)]),
         "history": scene.spec.to_json(),
         "integrator": INTEGRATOR,

@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.shortcomings import HELD, HELD_BEGUN, KEPT
 
 from .command import note, noting_when_cut_short, print_json
-from .options import AsJson, Head, Joints, Out, Seed, Skeleton, pairs
+from .options import AsJson, Head, Joints, Out, Seed, Skeleton, numbers, pairs
 
 SEVERAL = ("--groom", "--motion", "--set")
 """Options that take all words that follow: a shell's `--motion clips/*.bvh`."""
@@ -59,6 +59,13 @@ def train_command(
     variations: Annotated[
         int, typer.Option(min=0, max=50, help="Variations of each library style, besides the style itself.")
     ] = 0,
+    gesture: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND=TIMES",
+            help="How often generated motion has a kind of gesture, relative to the others: bow=3; repeat for more.",
+        ),
+    ] = None,
     rollouts: Annotated[
         int, typer.Option(help="Simulations to make and learn from, the latest 1200 at a time.")
     ] = 4000,
@@ -92,8 +99,8 @@ def train_command(
     with noting_when_cut_short(lambda: _how_to_go_on(out)), progress_bar("training") as progress:
         path = train(
             character, groom or [], motion or [], out, settings | pairs(setting, "--set"), method=method, paper=paper,
-            skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, variations=variations, rollouts=rollouts, processes=processes,
-            credits=credit or [], keep_work=keep_work, tell=note, progress=progress,
+            skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, variations=variations, gestures=numbers(gesture, "--gesture"),
+            rollouts=rollouts, processes=processes, credits=credit or [], keep_work=keep_work, tell=note, progress=progress,
         )  # fmt: skip
     meta = model.read(path).meta
     if as_json:

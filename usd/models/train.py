@@ -38,6 +38,7 @@ def train(
     begin: str | Path | None = None,
     resume: bool = False,
     variations: int = 0,
+    gestures: dict[str, float] | None = None,
     rollouts: int = 4000,
     processes: int = 1,
     credits=(),
@@ -61,6 +62,7 @@ def train(
             inputs.
         resume: continue an interrupted training.
         variations: of each style of the library, besides the style itself; 50 at most.
+        gestures: how often generated motion has each kind of gesture, relative to the others: {"bow": 3}.
         rollouts, processes: how many simulations, made by how many processes.
         credits: lines for the model card.
         keep_work: leave the simulations and the checkpoint beside the model.
@@ -103,7 +105,7 @@ def train(
     begin = begins_with(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(
         character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed,
-        variations=variations, tell=tell, progress=progress, **history,
+        variations=variations, tell=tell, progress=progress, gestures=gestures, **history,
     )  # fmt: skip
     path = train_strands(
         scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,

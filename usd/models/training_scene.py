@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pxr import Usd, UsdSkel
 
+from neuralocks_core.animation.random_motion import check_weights
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
@@ -54,6 +55,7 @@ def training_scene(
     joints: dict[str, str] | None = None,
     seed: int = 0,
     variations: int = 0,
+    gestures: dict[str, float] | None = None,
     tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
     **settings,
@@ -70,12 +72,14 @@ def training_scene(
         joints: semantic joint -> joint, if names are not enough.
         seed: for everything random.
         variations: of each style of the library, besides the style itself; MOST_VARIATIONS at most.
+        gestures: how often made-up motion has each kind of gesture, relative to the others.
         tell: called with notes for the user.
         progress: called with (done, total, message) while styles grow.
         **settings: further fields of TrainingScene.
 
     Raises:
-        NeuralocksError: a file cannot be used, there is no hair, or variations are asked for without the library, or too many.
+        NeuralocksError: a file cannot be used, there is no hair, variations are asked for without the library, or too many, or an unknown
+            gesture.
     """
     grooms, motion = ([words] if isinstance(words, str | Path) else words for words in (grooms, motion))
     if not 0 <= variations <= MOST_VARIATIONS:
@@ -84,6 +88,7 @@ def training_scene(
         raise NeuralocksError(
             f"--variations {variations}: apply to the library's styles; add --groom {LIBRARY}, or leave it out"
         )
+    weights = check_weights(gestures or {})
     rigs = read_rigs(character, skeleton, head, joints)
     rig = rigs[0]
     if "head" not in rig.character.humanoid:
@@ -96,7 +101,7 @@ def training_scene(
         if source != LIBRARY and source not in STYLES:
             found += _file(source, rig, head, joints, notes)
     clips = tuple(read_clip(path, rig.character, notes) for path in motion)
-    scene = TrainingScene(rig.character, tuple(found), clips, seed=seed, **settings)
+    scene = TrainingScene(rig.character, tuple(found), clips, seed=seed, gestures=weights, **settings)
     notes += [
         f"{path}: moves for less than {LEAST * scene.span:.1f} s at a time, too short to learn from; give longer motion"
         for path, clip in zip(motion, clips, strict=True)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from neuralocks_core import rotation
-from neuralocks_core.animation.random_motion import FOREIGN, KINDS, WILD, random_clip, scripted_clip
+from neuralocks_core.animation.random_motion import FOREIGN, KINDS, WILD, check_weights, random_clip, scripted_clip
+from neuralocks_core.errors import NeuralocksError
 from tests.core.rigs import HEAD, person
 
 TURNS = {"shake": 12, "turn": 12, "nod": 12, "bow": 30, "tilt": 12, "hold": 12}
@@ -32,6 +33,37 @@ def test_random_clips_are_rigid_start_still_and_stay_human(seed):
     assert np.allclose(turns @ turns.swapaxes(-1, -2), np.eye(3), atol=1e-9)
     assert acceleration(clip)[:5].max() < 2.0
     assert acceleration(clip).max() < 250.0
+
+
+def jumps(weights, seeds):
+    """How many random clips lift the hips as only a jump does."""
+    clips = (random_clip(person(), np.random.default_rng(seed), 3.65, wild=0, weights=weights) for seed in seeds)
+    heights = (clip.joints[:, 0, 1, 3] - clip.joints[0, 0, 1, 3] for clip in clips)
+    return sum(bool(height.max() > 0.05 and np.ptp(height) > 0.16) for height in heights)
+
+
+def test_a_gesture_is_as_frequent_as_it_is_wanted():
+    seeds = range(60)
+    assert jumps({kind: 0 for kind in KINDS if kind != "jump"}, seeds) == 60
+    assert jumps({"jump": 0}, seeds) == 0
+    seldom, often = jumps({}, seeds), jumps({"jump": 5}, seeds)
+    assert 3 <= seldom <= 18 and 22 <= often <= 40  # one to three of eleven kinds, or of fifteen
+
+
+@pytest.mark.parametrize(
+    "weights, fact",
+    [
+        ({"bwo": 3}, "--gesture bwo: unknown kind of motion; use shake, "),
+        ({"spin": 3}, "--gesture spin: unknown"),
+        ({"bow": -1}, "--gesture bow=-1: must be from 0 to 100"),
+        ({"bow": np.nan}, "--gesture bow=nan: must be"),
+        ({"bow": 101}, "--gesture bow=101: must be"),
+        ({kind: 0 for kind in KINDS}, "--gesture: leaves no kind of motion"),
+    ],
+)
+def test_gestures_that_cannot_be_made_are_refused(weights, fact):
+    with pytest.raises(NeuralocksError, match=fact):
+        check_weights(weights)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -229,6 +229,7 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, few, tmp_path):
         (replace(scene, character=renamed), "began with a different character"),
         (replace(scene, character=hung), "began with a different character"),
         (replace(scene, character=replace(scene.character, carrier=2)), "began with a different character"),
+        (replace(scene, gestures={"bow": 3}), "began with a different gesture"),
         (replace(scene, grooms=shorter), "began with a different groom; resume with the same, or train without"),
     ):
         with pytest.raises(NeuralocksError, match=fact):

@@ -97,6 +97,12 @@ def test_variations_are_of_a_style_of_the_library(tmp_path):
             training_scene(BODY, ["library"], variations=count)
 
 
+def test_gestures_are_checked_before_anything_is_read(tmp_path):
+    with pytest.raises(NeuralocksError, match="--gesture bwo: unknown kind of motion"):
+        training_scene(tmp_path / "none.usda", ["library"], gestures={"bwo": 3})
+    assert training_scene(BODY, ["coils"], gestures={"bow": 3}).gestures == {"bow": 3}
+
+
 @pytest.mark.parametrize("unit, up", [(0.01, "Z"), (0.0254, "Y")])
 def test_a_groom_suits_the_stage_of_its_character(tmp_path, unit, up):
     """Over a character in another unit or axis, it sits on the head without a transform by the user."""

@@ -17,6 +17,13 @@ def test_so_many_variations_as_fit_into_memory(capsys):
     assert "--variations" in capsys.readouterr().err
 
 
+def test_how_often_gestures_are_made_is_told_by_number(capsys):
+    words = ("train", "--character", "c.usda", "-o", "m.neuralocks", "--gesture")
+    for given, fact in (("bow=many", "--gesture bow=many: is not NAME=NUMBER"), ("bow", "--gesture bow: is not")):
+        assert status(*words, given) == 1
+        assert fact in capsys.readouterr().err
+
+
 def test_help_tells_what_a_training_begins_with_where_nothing_is_said(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     assert status("train", "--help") == 0
