@@ -4,6 +4,7 @@ better. A groom that lies close to what one of these has learned is moved by it,
 """
 
 import os
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -40,6 +41,12 @@ def nearest(strands: StrandSet) -> Path:
     far = {path: learned.distance(strands) for path, learned in _specialists().items()}
     best = min(far, key=far.get, default=None)
     return best if best is not None and far[best] <= NEAR else model.shipped()
+
+
+def nearest_to_all(grooms: Iterable[StrandSet]) -> Path:
+    """The shipped model that a training of these grooms begins with: the one for all hair if they are of several kinds."""
+    found = {nearest(strands.subset(spread(len(strands.rest), SOME))) for strands in grooms}
+    return found.pop() if len(found) == 1 else model.shipped()
 
 
 @cache

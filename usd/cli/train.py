@@ -45,7 +45,7 @@ def train_command(
         str | None,
         typer.Option(
             metavar="MODEL",
-            help="Start from what this model has learned, from the 'shipped' one or from 'nothing'.",
+            help="Start from what this model has learned, from the 'shipped' one that knows such hair best, or from 'nothing'.",
             show_default="shipped, where it fits",
         ),
     ] = None,

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from neuralocks_core import model
 from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.deformation.suited import nearest_to_all
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.number_words import plain_number
@@ -20,7 +21,7 @@ from ..border.extras import check_training
 
 METHODS = ("rollouts", "selfsupervised")
 SHIPPED, NOTHING = "shipped", "nothing"
-"""Words for what a training begins with."""
+"""Words for what a training begins with: the shipped model that knows such hair best, or random weights."""
 
 
 def train(
@@ -58,8 +59,8 @@ def train(
         method: "rollouts" of the solver, or "selfsupervised" as in the paper.
         paper: with "selfsupervised", use what the paper states, including its boundary history, unless `settings` say otherwise.
         skeleton, head, joints: as for `bake`.
-        begin: a model to start from, "shipped" or "nothing"; if left out, the shipped one if it has the same method, network and
-            inputs.
+        begin: a model to start from, "shipped" for the shipped one that knows such hair best, or "nothing"; if left out,
+            "shipped" where it has the same method, network and inputs.
         resume: continue an interrupted training.
         variations: of each style of the library, besides the style itself; 50 at most.
         gestures: how often generated motion has each kind of gesture, relative to the others: {"bow": 3}.
@@ -102,11 +103,16 @@ def train(
     work = work_folder(out, resume)
     if begin == NOTHING and resume and (work / BEGINNING).exists():
         raise NeuralocksError(f"--begin {NOTHING}: the training in {work} began with a model; resume without --begin")
+    chosen = begin in (None, SHIPPED)
     begin = begins_with(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(
         character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed,
         variations=variations, tell=tell, progress=progress, gestures=gestures, **history,
     )  # fmt: skip
+    if begin and chosen:
+        begin = nearest_to_all(scene.grooms)
+        if tell and (kind := model.kind_known(begin)):
+            tell([f"training begins with the shipped model for {kind} hair, which knows such hair best"])
     path = train_strands(
         scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,
         credits=tuple(credits), command=_command(), keep_work=keep_work, tell=tell, progress=progress,

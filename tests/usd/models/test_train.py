@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `neuralocks train` begins with, decided before anything large is read."""
 
+from pathlib import Path
+
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
@@ -14,12 +16,13 @@ from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression_options import RegressionOptions
 from usd.assets.grow import grow
 from usd.cli.train import one_by_one
-from usd.models.train import _command, begins_with
+from usd.models.train import _command, begins_with, train
 from usd.models.training_scene import MOST_STRANDS, read_clip, training_scene
 from usd.shot.stage import read_rigs
 
 from ..shots import HAIR, Recipe, write_shot
 
+BODY = Path(__file__).parents[3] / "examples/shot/body.usdc"
 SPEC, OTHER = BoundarySpec(), BoundarySpec(bins=(1,) * 30)
 LIKE, STILL, PAPER = RegressionOptions(), RegressionOptions(static=True), SelfSupervisedOptions.paper()
 
@@ -50,6 +53,29 @@ def test_what_is_named_is_taken_or_refused(tmp_path):
         NeuralocksError, match="none.neuralocks: no such model file; name another, 'shipped' or 'nothing'"
     ):
         begins_with(tmp_path / "none.neuralocks", False, SPEC, LIKE)
+
+
+@pytest.mark.parametrize(
+    "grooms, begin, taken",
+    [
+        (["coils"], "shipped", "strands_curly"),
+        (["coils", "bob"], None, "strands"),
+        (["coils"], str(model.shipped()), "strands"),
+    ],
+)
+def test_of_the_shipped_models_it_is_the_one_that_knows_such_hair(grooms, begin, taken, tmp_path, monkeypatch):
+    """What it knows it need not learn again. A file that is named is taken as it is."""
+    begun, told = [], []
+
+    def begins(scene, out, options, begin, **_):
+        begun.append(begin.stem)
+        return model.shipped()
+
+    monkeypatch.setattr("neuralocks_core.training.train.train_strands", begins)
+    monkeypatch.setattr("usd.models.training_scene.MOST_STRANDS", 40)
+    train(BODY, grooms, [], tmp_path / "own.neuralocks", {}, begin=begin, tell=told.extend)
+    assert begun == [taken]
+    assert ("curly hair" in told[0] if told else False) == (taken == "strands_curly")
 
 
 def test_what_a_training_should_know_is_told_before_it(tmp_path):
