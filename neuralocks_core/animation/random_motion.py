@@ -7,6 +7,8 @@ random ones.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from neuralocks_core.animation.puppet import FRONT, SIDE, UP, Puppet, ease, leap, noise, pulse, swing, travelled
@@ -33,8 +35,10 @@ def random_clip(
     shape: np.ndarray | None = None,
     wild: float = 0.2,
     weights: dict[str, float] | None = None,
+    stops: float = 0.0,
 ) -> Clip:
-    """A random motion of one to three gestures over swaying and posture; in a share of them the whole body spins or tumbles.
+    """A random motion of one to three gestures over swaying and posture; in a share of them the whole body spins or tumbles, and a
+    share stops amid it.
 
     Args:
         character: who moves.
@@ -44,6 +48,7 @@ def random_clip(
         shape: blend shape weights (B,).
         wild: the share in which the whole body spins or tumbles.
         weights: how often gestures are chosen, relative to all others, which have 1: see `check_weights`.
+        stops: the share that stops midway and keeps its pose from then on, while hair comes to rest.
     """
     times = np.arange(round(seconds * rate) + 1) / rate
     puppet = Puppet(character, times)
@@ -54,7 +59,8 @@ def random_clip(
     rare = [rng.choice(WILD)] if wild and rng.random() < wild else []
     for kind in dict.fromkeys(str(k) for k in (*chosen, *rare)):
         _GESTURES[kind](puppet, _Dice(rng, seconds))
-    return puppet.clip(shape)
+    clip = puppet.clip(shape)
+    return _stopped(clip, rng) if stops and rng.random() < stops else clip
 
 
 def scripted_clip(character: Character, kind: str, seconds: float = 5.0, rate: float = 30.0) -> Clip:
@@ -93,6 +99,14 @@ def _odds(weights: dict[str, float]) -> np.ndarray | None:
         return None
     each = np.array([weights.get(kind, 1.0) for kind in KINDS])
     return each / each.sum()
+
+
+def _stopped(clip: Clip, rng) -> Clip:
+    """The same motion until its time slows down and stands still, between a third and two thirds of its length."""
+    begin = clip.start + rng.uniform(0.3, 0.65) * (clip.end - clip.start)
+    brake = rng.uniform(0.1, 0.5)
+    since = np.clip(clip.times - begin, 0, brake)
+    return replace(clip, joints=clip.at(np.minimum(clip.times, begin) + since - since**2 / (2 * brake)))
 
 
 class _Dice:

@@ -33,6 +33,9 @@ FOLLOW = 0.04
 """[m] How far from the body hair still follows a change of its shape."""
 PREROLL = 30
 """Frames at the start of a cut from motion capture that are simulated but not learned from: the hair was not at rest there."""
+STOPS = 0.3
+"""The share of random clips that stop midway: without them, a training sees little of how hair comes to rest, and its networks
+swing on after a stop."""
 LEAST = 0.6
 """Shorter motion, relative to a rollout, is not cut from: the body would stand still for most of what is learned."""
 
@@ -242,7 +245,7 @@ class RolloutMaker:
             start = rng.uniform(source.start, max(source.start, source.end - span))
             clip, first = Clip(source.times, source.joints, np.tile(shape, (len(source.times), 1))), PREROLL
         else:
-            clip = random_clip(scene.character, rng, span, shape=shape, weights=scene.gestures)
+            clip = random_clip(scene.character, rng, span, shape=shape, weights=scene.gestures, stops=STOPS)
             start, first = clip.start, 1
         return clip, start + scene.spec.dt * np.arange(scene.frames), first
 

@@ -28,6 +28,8 @@ CODES = "codes.npz"
 """In the work folder: the strand autoencoder, if a training makes its own."""
 INPUTS = "inputs.json"
 """In the work folder: what its simulations were made from."""
+BEFORE = {"integrator": "implicit Euler", "material": "as it is", "gesture": {}, "share of stops": 0}
+"""What simulations were made with if INPUTS lack one of these names."""
 
 
 def work_folder(out: str | Path, resume: bool) -> Path:
@@ -124,10 +126,7 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
     file, now = work / INPUTS, _inputs(scene)
     if resume and file.exists():
         try:
-            # what inputs without these names were made with
-            before = {"integrator": "implicit Euler", "material": "as it is", "gesture": {}} | json.loads(
-                file.read_text("utf-8")
-            )
+            before = BEFORE | json.loads(file.read_text("utf-8"))
             changed = [name for name in now if before[name] != now[name]]
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise NeuralocksError(f"{file}: cannot be read; train without --resume") from None
@@ -144,6 +143,7 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
 
 def _inputs(scene: TrainingScene) -> dict:
     from neuralocks_core.reference.solver import INTEGRATOR
+    from neuralocks_core.training.rollouts import STOPS
 
     character, clips = scene.character, scene.clips
     body, skeleton = character.body, character.skeleton
@@ -165,6 +165,7 @@ def _inputs(scene: TrainingScene) -> dict:
         ),
         "groom": _digest([groom.rest for groom in scene.grooms]),
         "gesture": scene.gestures,
+        "share of stops": STOPS,
         "motion": _digest([array for clip in clips for array in (clip.times, clip.joints, clip.shape)]),
         "history": scene.spec.to_json(),
         "integrator": INTEGRATOR,

@@ -35,6 +35,28 @@ def test_random_clips_are_rigid_start_still_and_stay_human(seed):
     assert acceleration(clip).max() < 250.0
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_motion_that_stops_midway_is_the_same_until_then_and_keeps_its_pose(seed):
+    whole, stopped = (
+        random_clip(person(), np.random.default_rng(seed), 3.65, rate=60.0, stops=share) for share in (0.0, 1.0)
+    )
+    same = np.abs(stopped.joints - whole.joints).max(axis=(1, 2, 3)) < 1e-9
+    until = len(same) if same.all() else int(np.argmin(same))
+    held = np.abs(stopped.joints - stopped.joints[-1]).max(axis=(1, 2, 3)) < 1e-9
+    assert until >= 0.3 * len(same)  # then it slows down for half a second at most, and stands still
+    assert held[round(0.65 * len(held)) + 31 :].all()
+    assert acceleration(stopped).max() < 250.0
+
+
+def test_so_many_stop_midway():
+    """Their motion before is that of clips without stops, so that one seed compares both."""
+    pairs = [
+        [random_clip(person(), np.random.default_rng(seed), 3.65, stops=share).joints for share in (0.0, 0.3)]
+        for seed in range(80)
+    ]
+    assert 12 <= sum(not np.array_equal(*pair) for pair in pairs) <= 36
+
+
 def jumps(weights, seeds):
     """How many random clips lift the hips as only a jump does."""
     clips = (random_clip(person(), np.random.default_rng(seed), 3.65, wild=0, weights=weights) for seed in seeds)
