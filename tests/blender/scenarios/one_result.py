@@ -300,9 +300,9 @@ def shipped_shot(folder: Path) -> None:
 
     armature, _, strands = blender_shot.build()
     make_live(armature, strands)
-    strands.neuralocks_hair.model = ""  # the shipped one
+    strands.neuralocks_hair.model = ""  # a shipped one
     out = bake(blender_shot.SHOT, folder / "shot.usdc", frames=[40, 90], velocities=False).path
     y_up = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     for frame in (90, 40):
         assert apart(points_at(strands, frame), baked_points(out, "/Body/Hair", frame) @ y_up.T) < SAME
-    assert unnamed_model(strands) == "Shipped with the add-on"  # the one for all styles
+    assert unnamed_model(strands) == "Shipped with the add-on: long hair"
