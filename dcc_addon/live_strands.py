@@ -15,7 +15,7 @@ from neuralocks_core.rotation import inverse
 from . import edited, joined, preparing
 from .blowing import in_core
 from .kept import Prepared
-from .models import load_model, model_path, stamp
+from .models import load_model, model_path, named_model, stamp
 from .pose import pose
 from .scene import curves
 from .scene.layers import graph_of, layer_of
@@ -185,7 +185,7 @@ def _recipe(hair, sampled, wanted: tuple):
     name, data, path, character = hair.name_full, hair.data, model_path(hair), sampled.carrying(hair.name_full)
     own, counts, place = curves.points(data), curves.counts(data), sampled.bind_places[name]
     radius, of = curves.radius(data), _which(hair)
-    named = path if hair.neuralocks_hair.model.strip() else None
+    named = named_model(hair)
     # The hair keeps its character alive, so no other one gets its id.
     file = path, stamp(path)
     made_of = zlib.crc32(own), zlib.crc32(counts), place.tobytes(), file, named, id(character)

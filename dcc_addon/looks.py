@@ -7,7 +7,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from .blowing import blowing
 from .live_strands import material_words, typed
-from .models import load_model, model_path
+from .models import load_model, model_path, named_model
 from .scene import curves
 from .services.sliders import MOTION
 from .services.wind import Blowing
@@ -58,7 +58,7 @@ def grouped(hairs, undrawn) -> tuple[list[tuple[Look, list[str]]], list[str]]:
 
 def _look(hair) -> Look:
     settings = hair.neuralocks_hair
-    path = model_path(hair)
-    wind = blowing(settings.armature) if load_model(path).feels_wind else Blowing()
-    named = path if settings.model.strip() else None
-    return Look(tuple(material_words(settings)), typed(settings, MOTION.name), settings.resolve, named, wind)
+    wind = blowing(settings.armature) if load_model(model_path(hair)).feels_wind else Blowing()
+    return Look(
+        tuple(material_words(settings)), typed(settings, MOTION.name), settings.resolve, named_model(hair), wind
+    )

@@ -34,15 +34,19 @@ def stamp(found: str) -> tuple | None:
 
 
 def model_path(thing, kind: str = "strands") -> str:
-    """Absolute path of the model that the panel names for a hair object, or for an armature with hair bones; the shipped one if it
-    names none.
+    """Absolute path of the model of a hair object, or of an armature with hair bones: `named_model`, else the shipped one."""
+    return named_model(thing, kind) or str(model_file.shipped(kind))
+
+
+def named_model(thing, kind: str = "strands") -> str | None:
+    """Absolute path of the model that the panel names for such an object; None if it names none.
 
     Raises:
         NeuralocksError: it is named relative to a file, and is not there.
     """
     path = thing.path_resolve(SETTING[kind])
     if not path.strip():
-        return str(model_file.shipped(kind))
+        return None
     library = library_of(thing, SETTING[kind])
     found = absolute(path, library)
     if path.startswith("//") and not os.path.exists(found):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from neuralocks_core.animation.random_motion import scripted_clip
+from neuralocks_core.animation.random_motion import KINDS, scripted_clip
 from neuralocks_core.metrics import motion_error
 from neuralocks_core.motion import Clip
 from neuralocks_core.smooth_motion import SmoothMotion
@@ -52,3 +52,16 @@ def test_hair_is_simulated_on_the_motion_that_the_network_reads(scene, rate, hel
         assert np.abs(rollout.vectors - true.vectors)[:, scene.spec.slices["pose"]].max() < 1e-3
         lengths = np.linalg.norm(np.diff(true.rest, axis=1), axis=-1).sum(axis=1)
         assert motion_error(moved, wanted, lengths)["median"] < 0.01
+
+
+def test_made_up_motion_has_the_gestures_wanted_and_stops(scene, monkeypatch):
+    """Walks, of which few end in time to stand still for the last fifth; all do if all stop midway."""
+    maker = RolloutMaker(replace(scene, frames=110, gestures={kind: float(kind == "walk") for kind in KINDS}))
+    standing = []
+    for share in (0.0, 1.0):
+        monkeypatch.setattr("neuralocks_core.training.rollouts.STOPS", share)
+        clips = [maker.draw(i).clip for i in range(10)]
+        gone = [np.linalg.norm(np.ptp(clip.joints[:, 0, :3, 3], axis=0)) for clip in clips]
+        assert min(gone) > 0.3
+        standing.append(sum(bool(np.ptp(clip.joints[-20:], axis=0).max() < 1e-9) for clip in clips))
+    assert standing[0] < 5 and standing[1] == 10

@@ -60,11 +60,12 @@ def test_notes_that_are_none_are_one_line(tmp_path, monkeypatch, forged):
         work.keep_inputs(SimpleNamespace(), tmp_path, resume=True)
 
 
-def test_simulations_of_another_solver_are_not_gone_on_with(tmp_path, monkeypatch):
-    """Those of a release whose solver damped motion by its steps name no integrator."""
-    monkeypatch.setattr(work, "_inputs", lambda scene: {"seed": 0, "integrator": "BDF2"})
+@pytest.mark.parametrize("name, now", [("integrator", "BDF2"), ("share of stops", 0.3), ("gesture", {"bow": 3.0})])
+def test_simulations_made_otherwise_are_not_gone_on_with(tmp_path, monkeypatch, name, now):
+    """Those of a release whose solver damped motion by its steps name no integrator, and those without stops no share of these."""
+    monkeypatch.setattr(work, "_inputs", lambda scene: {"seed": 0, name: now})
     (tmp_path / work.INPUTS).write_text('{"seed": 0}')
-    with pytest.raises(NeuralocksError, match="began with a different integrator; .*train without --resume"):
+    with pytest.raises(NeuralocksError, match=f"began with a different {name}; .*train without --resume"):
         work.keep_inputs(SimpleNamespace(), tmp_path, resume=True)
 
 
