@@ -9,6 +9,7 @@ chunk per core at a time.
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
+from functools import lru_cache
 from numbers import Integral
 
 import numpy as np
@@ -41,6 +42,8 @@ OUT = {
 }
 CHANGED = {"middle": HIDDEN, "out": SHAPE}
 """Further outputs of the frame graph if it changes the weights of the tail."""
+GRAPHS = 24
+"""Graphs that stay loaded: of six models. A model that is read again, as for another scene or groom, need not be loaded again."""
 LARGEST = 1e7
 """Outputs with a larger root mean square cannot be hair, whatever its units."""
 
@@ -247,16 +250,24 @@ def graph_session(file: model_file.ModelFile, name: str):
     import onnxruntime
 
     onnxruntime.disable_telemetry_events()
+    try:
+        return _session(file.graphs[name])
+    except Exception as error:  # onnxruntime raises its own bare types for all errors in a graph
+        raise NeuralocksError(f"{file.path}: {name} cannot be loaded ({_fact(error)}); get an undamaged copy") from None
+
+
+@lru_cache(maxsize=GRAPHS)
+def _session(graph: bytes):
+    """The session of a graph; threads and models may share it, for it keeps nothing between runs."""
+    import onnxruntime
+
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1  # the cores share chunks instead: no waiting between layers
     options.enable_cpu_mem_arena = False  # it keeps 13 MB in two threads, and saves at most a hundredth of the time
     options.log_severity_level = 4  # errors are raised anyway
     # Not its own format, which `odd_part` cannot read.
     options.add_session_config_entry("session.load_model_format", "ONNX")
-    try:
-        return onnxruntime.InferenceSession(file.graphs[name], options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime raises its own bare types for all errors in a graph
-        raise NeuralocksError(f"{file.path}: {name} cannot be loaded ({_fact(error)}); get an undamaged copy") from None
+    return onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
 
 
 def _fact(error: Exception) -> str:

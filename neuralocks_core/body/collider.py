@@ -4,9 +4,8 @@
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from neuralocks_core.body.tree_search import search
+from neuralocks_core.body.tree_search import search, surface_tree
 from neuralocks_core.errors import NeuralocksError
 
 MOST_SAMPLES = 400_000
@@ -42,8 +41,9 @@ class Collider:
             raise NeuralocksError("body: its mesh has no triangle with an area; choose a surface mesh")
         self.triangles = triangles[kept]
         self._normals = cross[kept] / area[kept, None]
-        samples, self._owner, self._reach = _spread(a[kept], b[kept], c[kept])
-        self._tree = cKDTree(samples)
+        samples, self._owner, self._around = _spread(a[kept], b[kept], c[kept])
+        self._reach = float(self._around.max())
+        self._tree = surface_tree(samples)
 
     def distance(self, points: np.ndarray, limit: float = 0.03, proven: bool = True) -> tuple[np.ndarray, np.ndarray]:
         """Signed distance [m] (..., ), negative inside, and the unit direction (..., 3) in which it grows fastest.
@@ -78,14 +78,15 @@ class Collider:
         # The nearest sample's face may be on the wrong side near ears and other thin parts: what seems inside is proven.
         inside = ((points - closest) * normal).sum(axis=1) < 0
         near = np.flatnonzero((rough <= limit + self._reach) | inside)
-        closest, normal, triangle = closest.copy(), normal.copy(), triangle.copy()
+        closest, normal, triangle, best = closest.copy(), normal.copy(), triangle.copy(), rough.copy()
         pending, k = near, 8 if proven else 4
         while len(pending):
             count, left = min(k, self._tree.n), []
             for here in np.split(pending, range(0, len(pending), max(1, CANDIDATES // count))[1:]):
                 far, found = search(self._tree, points[here], np.arange(1, count + 1))
-                closest[here], normal[here], triangle[here], best = self._nearest(points[here], self._owner[found])
-                done = (far[:, -1] >= best + self._reach) | (count == self._tree.n) | (not proven)
+                able = far - self._around[found] <= best[here, None]  # no place on the others' triangles can be nearer
+                closest[here], normal[here], triangle[here], best[here] = self._nearest(points[here], found, able)
+                done = (far[:, -1] >= best[here] + self._reach) | (count == self._tree.n) | (not proven)
                 left.append(here[~done])
             pending, k = np.concatenate(left), 4 * k
         offset = points - closest
@@ -96,15 +97,19 @@ class Collider:
         direction = np.where(length[:, None] > 1e-9, along, normal)
         return (sign * length).reshape(shape), direction.reshape(*shape, 3), triangle.reshape(shape)
 
-    def _nearest(self, points, candidates):
-        """Closest point, pseudonormal there, triangle and distance, of candidate triangles (N, k), for points (N, 3)."""
-        corners = self.points[self.triangles[candidates]]
-        place, feature = closest_on_triangle(points[:, None], *np.moveaxis(corners, -2, 0))
-        squared = ((place - points[:, None]) ** 2).sum(axis=-1)
-        best = squared.argmin(axis=1)
-        rows = np.arange(len(points))
-        triangle, feature = candidates[rows, best], feature[rows, best]
-        return place[rows, best], self._pseudonormals[triangle, feature], triangle, np.sqrt(squared[rows, best])
+    def _nearest(self, points: np.ndarray, samples: np.ndarray, able: np.ndarray):
+        """Closest point, pseudonormal there, triangle and distance, of the triangles of those samples (N, k) that are `able`
+        (N, k), of which each of the points (N, 3) has one.
+        """
+        row, column = np.nonzero(able)
+        candidate = self._owner[samples[row, column]]
+        place, feature = closest_on_triangle(points[row], *np.moveaxis(self.points[self.triangles[candidate]], 1, 0))
+        squared = np.square(place - points[row]).sum(axis=1)
+        least = np.minimum.reduceat(squared, np.searchsorted(row, np.arange(len(points))))
+        tied = np.flatnonzero(squared == least[row])
+        first = tied[np.unique(row[tied], return_index=True)[1]]
+        triangle = candidate[first]
+        return place[first], self._pseudonormals[triangle, feature[first]], triangle, np.sqrt(least)
 
     @cached_property
     def _pseudonormals(self) -> np.ndarray:
@@ -171,8 +176,8 @@ def split_triangle(m: int) -> np.ndarray:
     return np.concatenate([up, down]) / m
 
 
-def _spread(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Points spread over triangles (n, 3), the triangle of each (n,), and the largest distance of the surface from them [m].
+def _spread(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points spread over triangles (n, 3), the triangle of each (n,), and how far what it stands for reaches from it (n,) [m].
 
     Triangles larger than most are split into m x m congruent ones, whose centroids are used.
     """
@@ -184,11 +189,12 @@ def _spread(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np
         if (split.astype(float) ** 2).sum() <= max(MOST_SAMPLES, len(a)):
             break
         reach *= 1.5
-    samples, owner = [], []
+    samples, owner, around = [], [], []
     for m in np.unique(split):
         which = np.flatnonzero(split == m)
         uv = split_triangle(m)
         at = a[which, None] + uv[None, :, :1] * (b - a)[which, None] + uv[None, :, 1:] * (c - a)[which, None]
         samples.append(at.reshape(-1, 3))
         owner.append(np.repeat(which, len(uv)))
-    return np.concatenate(samples), np.concatenate(owner), float(np.max(radius / split))
+        around.append(np.repeat(radius[which] / m, len(uv)))
+    return np.concatenate(samples), np.concatenate(owner), np.concatenate(around)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.body.collider import split_triangle
+from neuralocks_core.body.tree_search import surface_tree
 from neuralocks_core.native.library import library
 from neuralocks_core.native.posed_skin import pose_skin
 from neuralocks_core.sums import dot, in_order
@@ -87,7 +88,7 @@ class Skin:
         place, normal = _planes(points, self.corners, self.part)
         count = min(NEIGHBOURS, len(place))
         self.square = np.square(spacing).astype(np.float32)
-        tree = cKDTree(place)
+        tree = surface_tree(place)
         far, near = tree.query(place, k=np.arange(1, count + 1))
         near[:, 0] = np.arange(len(place))
         # Skin on the other side of a thin part is not a neighbour; the sample itself stands in for it.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nearest points of a k-d tree, looked for by several threads."""
+"""The nearest points of a surface: a k-d tree for them, and several threads that look."""
 
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +12,18 @@ SHARE = 1_000
 """Points that a thread is started for at least: few are found before others have started."""
 BLOCK = 1_000
 """Points that a thread looks for at a time: far from a dense body, thousands take a second, for which Ctrl-C would wait."""
+
+LEAF = 32
+"""Points in a leaf of the tree."""
+
+
+def surface_tree(points: np.ndarray) -> cKDTree:
+    """A tree of points (N, 3) on a surface, for places that may be far from it.
+
+    Its cells are halved at their middle, and not shrunk to the points in them as SciPy's are unless told: it is made sooner, and
+    finds the nearest of a place a decimetre away several times sooner. On the surface both take about the same.
+    """
+    return cKDTree(points, LEAF, compact_nodes=False, balanced_tree=False)
 
 
 def search(tree: cKDTree, points: np.ndarray, k=1) -> tuple[np.ndarray, np.ndarray]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import ndimage
-from scipy.spatial import cKDTree
 
-from neuralocks_core.body.tree_search import search
+from neuralocks_core.body.tree_search import search, surface_tree
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.mesh import vertex_normals
@@ -97,7 +96,7 @@ def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> 
     if not inside.any():
         raise NeuralocksError("body: none of its mesh lies near the scalp; give both in the same space")
     sample, normal = sample[inside], normal[inside]
-    distance, nearest = search(cKDTree(sample), grid)
+    distance, nearest = search(surface_tree(sample), grid)
     plane = ((grid - sample[nearest]) * normal[nearest]).sum(axis=1)
     flat = np.clip(2.0 - distance / 0.006, 0.0, 1.0)  # the plane's up to 6 mm, the sample's beyond 12 mm
     return np.where(plane < 0, -1.0, 1.0) * (flat * np.abs(plane) + (1 - flat) * distance)

@@ -14,6 +14,7 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from neuralocks_core.body.tree_search import surface_tree
 from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.motion import GRAVITY
@@ -121,7 +122,7 @@ class MomentPool:
         for i, t in enumerate(late):
             surface = normals = None
             if bodies is not None:
-                surface, normals = cKDTree(bodies[i]), vertex_normals(bodies[i], maker.body.triangles)
+                surface, normals = surface_tree(bodies[i]), vertex_normals(bodies[i], maker.body.triangles)
             gravity = head[t, :3, :3].T @ GRAVITY
             self.moments.append(Moment(len(self.hair) - 1, vectors[t - 2 : t + 1], gravity, back[i], surface, normals))
 
@@ -131,7 +132,7 @@ class MomentPool:
         body = self._maker.body
         if body is not None:
             points = self.scene.character.canonical(body.shaped(draw.shape))
-            planes, _ = nearest_planes(cKDTree(points), vertex_normals(points, body.triangles), rest)
+            planes, _ = nearest_planes(surface_tree(points), vertex_normals(points, body.triangles), rest)
             own = (planes[..., :3] * rest).sum(-1) - planes[..., 3]
             margin = np.minimum(margin, own).astype(np.float32)
         if self.nearest_vertices:

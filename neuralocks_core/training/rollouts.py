@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from neuralocks_core.animation.random_motion import check_weights, random_clip
+from neuralocks_core.body.tree_search import surface_tree
 from neuralocks_core.boundary import BoundarySampler, joints_read
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
@@ -155,7 +155,7 @@ class RolloutMaker:
         self._captured = [Stepped.of(part, read).clip for clip in clips for part in scene.usable(clip)]
         self._surface = None
         if scene.character.body is not None and scene.character.body.shapes:
-            self._surface = cKDTree(scene.character.canonical(scene.character.body.points))
+            self._surface = surface_tree(scene.character.canonical(scene.character.body.points))
 
     def make(self, index: int) -> Rollout:
         """Rollout number `index`."""

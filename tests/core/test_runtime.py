@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from neuralocks_core import materials, model
+from neuralocks_core import materials, model, runtime
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.deformation.strand_session import StrandSession, strand_inputs
@@ -116,6 +116,17 @@ def test_threads_and_chunks_give_the_same_bits(path, strands):
     parts = np.full_like(whole, np.nan)
     session.each(vector, lambda chunk, moved: parts.__setitem__(chunk, moved))
     assert np.array_equal(session.displacement(vector), whole) and np.array_equal(parts, whole)
+
+
+def test_a_model_that_is_read_again_is_not_loaded_again(path, tmp_path):
+    """Another of the same description is, even in the same file."""
+    file = tmp_path / "copy.neuralocks"
+    file.write_bytes(path.read_bytes())
+    one, two = (runtime.graph_session(model.read(each), "tail.onnx") for each in (path, file))
+    assert one is two
+    changed = {**model.read(file).graphs, "tail.onnx": model.read(model.shipped("strands")).graphs["tail.onnx"]}
+    model.write(file, model.read(file).meta, changed)
+    assert runtime.graph_session(model.read(file), "tail.onnx") is not one
 
 
 def test_the_held_bind_pose_is_exactly_the_groom(path, strands):

@@ -2,9 +2,9 @@
 """Distance to skin: a tree of a mesh's points, with extra points on faces so wide that hair on them is far from the corners."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from neuralocks_core.body.collider import split_triangle
+from neuralocks_core.body.tree_search import surface_tree
 
 WIDE = 0.06
 """Triangles with a side longer than this [m] are split until none is: on smaller ones most hair is within half of it of a
@@ -24,7 +24,7 @@ class Skin:
     def __init__(self, points: np.ndarray, triangles: np.ndarray):
         more, corner = _on_wide(points, triangles)
         self._vertex = np.concatenate([np.arange(len(points)), corner, [len(points)]])
-        self._tree = cKDTree(np.concatenate([points, more]))
+        self._tree = surface_tree(np.concatenate([points, more]))
 
     def query(self, points: np.ndarray, within: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Distance [m] of points (n, 3) from the skin, and the mesh's vertex there; infinity and V if it is not `within` this

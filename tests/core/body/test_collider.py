@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from neuralocks_core.body import collider
+from neuralocks_core.body import collider, tree_search
 from neuralocks_core.body.collider import Collider, closest_on_triangle
 from neuralocks_core.errors import NeuralocksError
 
@@ -48,12 +48,12 @@ def test_memory_is_bounded_though_many_points_need_many_triangles(monkeypatch):
     told = Collider(ball.vertices, ball.faces).distance(points)[0]
     asked = []
 
-    class Tree(collider.cKDTree):
+    class Tree(tree_search.cKDTree):
         def query(self, x, k=1, **options):
             asked.append(len(x) * np.size(k))
             return super().query(x, k, **options)
 
-    monkeypatch.setattr(collider, "cKDTree", Tree)
+    monkeypatch.setattr(tree_search, "cKDTree", Tree)
     monkeypatch.setattr(collider, "CANDIDATES", 5000)
     found = Collider(ball.vertices, ball.faces).distance(points)[0]
     assert len(asked) > 10 and max(asked) <= 5000

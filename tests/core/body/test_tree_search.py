@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from neuralocks_core.body.tree_search import BLOCK, SHARE, search
+from neuralocks_core.body.tree_search import BLOCK, SHARE, search, surface_tree
+
+_RANDOM = np.random.default_rng(0).normal(size=(2000, 3))
 
 
 @pytest.mark.parametrize("k", [1, np.arange(1, 4)])
@@ -26,6 +28,25 @@ def test_the_threads_find_what_one_finds(count, k, monkeypatch):
     for found, wanted in zip(search(tree, points, k), tree.query(points, k), strict=True):
         assert found.dtype == wanted.dtype
         np.testing.assert_array_equal(found, wanted)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        _RANDOM,
+        np.round(_RANDOM),
+        _RANDOM * [1, 1, 0],
+        np.repeat(2.0 ** -np.arange(1000.0)[:, None], 3, axis=1),
+        np.concatenate([1e-9 * _RANDOM, [[1e7, 1e7, 1e7]]]),
+        _RANDOM[:0],
+    ],
+    ids=["cloud", "on one another", "plane", "ever closer", "one far away", "none"],
+)
+def test_the_tree_of_a_surface_finds_what_scipys_own_finds(surface):
+    places = np.random.default_rng(1).normal(size=(500, 3)) * np.geomspace(1e-3, 10, 500)[:, None]
+    for k in (1, np.arange(1, 5)):
+        found, wanted = (tree.query(places, k)[0] for tree in (surface_tree(surface), cKDTree(surface)))
+        np.testing.assert_allclose(found, wanted, rtol=1e-15)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no signal reaches one process alone")

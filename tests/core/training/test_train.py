@@ -125,7 +125,7 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(sc
         for index in range(ready):
             save(folder / f"{index:06d}.npz", RolloutMaker(scene).make(index))
         monkeypatch.setattr("neuralocks_core.training.train.discard", lambda work: None)
-        train_strands(scene, out, RegressionOptions(steps=80, clips=4, strands=4), rollouts=10)
+        train_strands(scene, out, RegressionOptions(steps=40, clips=4, strands=4), rollouts=10)
         graphs.append(model.read(out).graphs)
         assert model.read(out).meta["training"]["rollouts"] == 10
     assert graphs[0] == graphs[1]
@@ -134,9 +134,9 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(sc
 def test_hair_learns_to_move_in_a_minute(scene, tmp_path):
     """On motion and strands that it never saw, the network halves the error of hair carried rigidly."""
     messages = []
-    options = RegressionOptions(steps=500, clips=16, strands=6, rate=4e-3)
+    options = RegressionOptions(steps=300, clips=8, strands=6, rate=1e-2)
     path = train_strands(
-        scene, tmp_path / "hair.neuralocks", options, rollouts=60, progress=lambda *a: messages.append(a)
+        scene, tmp_path / "hair.neuralocks", options, rollouts=40, progress=lambda *a: messages.append(a)
     )
     report = model.read(path).meta["report"]["held out"]
     assert report["motion"] < 0.7

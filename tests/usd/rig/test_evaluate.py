@@ -85,7 +85,8 @@ def test_depths_are_those_of_a_known_body(tmp_path, monkeypatch):
     assert card["body_rigid"]["penetration_worst_mm"] == 0
 
 
-def test_a_bake_keeps_hair_out_and_rests_and_the_command_says_so(tmp_path, capsys):
+def test_a_bake_keeps_hair_out_and_rests_and_the_command_says_so(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("usd.rig.evaluate.FRAMES", 12)
     baked = bake_rig(EXAMPLE / "shot.usda", tmp_path / "baked.usdc", EXAMPLE / "quasi_static.neuralocks").path
     assert status("rig", "evaluate", baked, "--json") == 0
     card = json.loads(capsys.readouterr().out)
