@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import ndimage
 
@@ -27,17 +29,13 @@ class Obstacle:
     """
 
     def __init__(self, scalp: Scalp, body: tuple[np.ndarray, np.ndarray] | None = None) -> None:
-        radius, centre = scalp.radius, scalp.head_centre
-        self._low = centre - radius * np.array([3.2, 7.0, 3.0])
-        high = centre + radius * np.array([3.2, 2.2, 3.0])
-        self._step = _CELL * radius
-        axes = [np.arange(a, b, self._step) for a, b in zip(self._low, high, strict=True)]
-        self._shape = np.array([len(axis) for axis in axes])
-        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        self._low, self._step, self._shape, grid = _grid(scalp.radius, scalp.head_centre)
         if body is None:
             distance = _stand_in(grid, scalp)
         else:
-            distance = _to_surface(grid, *body)
+            points, triangles = np.asarray(body[0], np.float64), np.asarray(body[1], np.int64)
+            centre = tuple(map(float, scalp.head_centre))
+            distance = _distances(float(scalp.radius), centre, points.tobytes(), triangles.tobytes())
         field = _without_pockets(distance.reshape(self._shape), self._step)
         slope = np.stack(np.gradient(field, self._step), axis=-1)
         self._field = np.concatenate([field[..., None], slope], axis=-1).astype(np.float32).reshape(-1, 4)
@@ -76,13 +74,28 @@ class Obstacle:
         return points + np.maximum(margin - distance, 0.0)[:, None] * out
 
 
+def _grid(radius: float, centre: np.ndarray) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
+    """Low corner (3,) [m] of a grid around a head, its spacing [m], its numbers of nodes (3,), and all of them (N, 3) [m]."""
+    low, step = centre - radius * np.array([3.2, 7.0, 3.0]), _CELL * radius
+    high = centre + radius * np.array([3.2, 2.2, 3.0])
+    axes = [np.arange(a, b, step) for a, b in zip(low, high, strict=True)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return low, step, np.array([len(axis) for axis in axes]), nodes
+
+
+@lru_cache(maxsize=2)  # a second style on the same head takes a fraction of the time of the first
+def _distances(radius: float, centre: tuple[float, ...], points: bytes, triangles: bytes) -> np.ndarray:
+    """`_to_surface` of the nodes of a head's grid."""
+    nodes = _grid(radius, np.array(centre))[-1]
+    return _to_surface(nodes, np.frombuffer(points).reshape(-1, 3), np.frombuffer(triangles, np.int64).reshape(-1, 3))
+
+
 def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(N,) signed distance to a mesh from its nearest corner or face centre.
 
     Near the surface, it is the distance to the sample's tangent plane. This is coarser than `collider.Collider` but many
     times faster; grown hair keeps some millimetres away.
     """
-    points, triangles = np.asarray(points, np.float64), np.asarray(triangles, np.int64)
     if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points) or not np.isfinite(points).all():
         raise NeuralocksError("body: is not a triangle mesh of finite points; repair the mesh")
     a, b, c = (points[triangles[:, corner]] for corner in range(3))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.body.collider import Collider
-from neuralocks_core.body.head_field import HeadField
+from neuralocks_core.body.head_field import head_field
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
@@ -121,7 +121,7 @@ class Barber:
         # Nor in a mouth, a nostril or an eye's socket.
         character = self.character
         points = character.canonical(character.body.points) / character.times_human
-        depth = HeadField(points, self._skin, character.on_head).distance(points[self._skin].mean(axis=1))[0]
+        depth = head_field(points, self._skin, character.on_head).distance(points[self._skin].mean(axis=1))[0]
         return self._skin[depth > -HOLLOW]
 
     @cached_property
