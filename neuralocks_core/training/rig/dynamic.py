@@ -26,6 +26,7 @@ from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
+from neuralocks_core.training.rollouts import STOPS
 from neuralocks_core.training.threads import threads
 
 _VELOCITY = 20.0
@@ -181,7 +182,10 @@ def _simulated(rig, material, spec, clips, seconds, rng, say) -> tuple[np.ndarra
     parts, read, posed = [], [], []
     for first in range(0, clips, 16):
         say(first, clips, f"simulating motion, {first} of {clips} clips")
-        few = [random_clip(rig.character, rng, seconds, rate=RATE, wild=_WILD) for _ in range(min(16, clips - first))]
+        few = [
+            random_clip(rig.character, rng, seconds, rate=RATE, wild=_WILD, stops=STOPS)
+            for _ in range(min(16, clips - first))
+        ]
         parts.append(simulate_motions(rig, material, spec, few))
         for motion, features in zip(few, parts[-1][0]):
             samples = rng.choice(len(features), min(_MOMENTS, len(features)), replace=False)

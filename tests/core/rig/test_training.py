@@ -271,6 +271,22 @@ def test_direct_optimisation_is_never_worse_than_the_network_it_begins_with(monk
     assert (energy[1] <= energy[0] + 1e-4).all()
 
 
+def test_chains_are_simulated_coming_to_rest(monkeypatch):
+    """Of made-up motion, half of the clips at most stand still for their last 0.8 seconds; all do if all stop midway."""
+    standing = []
+
+    def count(rig, material, spec, clips):
+        standing.append(sum(bool(np.ptp(clip.joints[-25:], axis=0).max() < 1e-9) for clip in clips))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rig_dynamic, "simulate_motions", count)
+    for share in (0.0, 1.0):
+        monkeypatch.setattr(rig_dynamic, "STOPS", share)
+        with pytest.raises(KeyboardInterrupt):
+            train_dynamic(with_balls()[0], steps=2, clips=16)
+    assert standing[0] <= 8 and standing[1] == 16
+
+
 def test_progress_goes_on_through_the_report(monkeypatch):
     """In both trainings: never backwards, to the end of the bar, and with messages on the report's progress."""
     monkeypatch.setattr(rig_dynamic, "motion_report", partial(motion_report, kinds=("nod",)))
