@@ -78,14 +78,20 @@ class Collider:
         # The nearest sample's face may be on the wrong side near ears and other thin parts: what seems inside is proven.
         inside = ((points - closest) * normal).sum(axis=1) < 0
         near = np.flatnonzero((rough <= limit + self._reach) | inside)
-        closest, normal, triangle, best = closest.copy(), normal.copy(), triangle.copy(), rough.copy()
+        closest, normal, triangle, best = closest.copy(), normal.copy(), triangle.copy(), np.full(len(points), np.inf)
         pending, k = near, 8 if proven else 4
         while len(pending):
             count, left = min(k, self._tree.n), []
             for here in np.split(pending, range(0, len(pending), max(1, CANDIDATES // count))[1:]):
                 far, found = search(self._tree, points[here], np.arange(1, count + 1))
-                able = far - self._around[found] <= best[here, None]  # no place on the others' triangles can be nearer
-                closest[here], normal[here], triangle[here], best[here] = self._nearest(points[here], found, able)
+                # No place on the others' triangles can be nearer.
+                able = far - self._around[found] <= np.minimum(rough[here], best[here])[:, None]
+                able[:, 0] = True
+                place, along, owner, least = self._nearest(points[here], found, able)
+                nearer = least < best[here]  # what an earlier round found may not be among these
+                rows = here[nearer]
+                closest[rows], normal[rows], triangle[rows] = place[nearer], along[nearer], owner[nearer]
+                best[rows] = least[nearer]
                 done = (far[:, -1] >= best[here] + self._reach) | (count == self._tree.n) | (not proven)
                 left.append(here[~done])
             pending, k = np.concatenate(left), 4 * k

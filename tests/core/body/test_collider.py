@@ -60,6 +60,20 @@ def test_memory_is_bounded_though_many_points_need_many_triangles(monkeypatch):
     np.testing.assert_array_equal(found, told)
 
 
+def test_among_large_and_tiny_triangles_the_nearest_is_found():
+    """Some samples stand for a hundred times as much surface as others: those of a triangle may be farther than many others."""
+    rng = np.random.default_rng(11)
+    sizes = 10 ** rng.uniform(-3, -0.5, 400)
+    corners = rng.normal(0, 0.2, (400, 1, 3)) + sizes[:, None, None] * rng.normal(size=(400, 3, 3))
+    mesh = Collider(corners.reshape(-1, 3), np.arange(1200).reshape(-1, 3))
+    points = rng.normal(0, 0.3, (500, 3))
+    places = closest_on_triangle(points[:, None], *np.moveaxis(mesh.points[mesh.triangles], 1, 0))[0]
+    wanted = np.linalg.norm(places - points[:, None], axis=-1)
+    distance, _, triangle = mesh.closest(points, limit=np.inf)
+    np.testing.assert_allclose(np.abs(distance), wanted.min(axis=1), atol=1e-12)
+    np.testing.assert_allclose(wanted[np.arange(500), triangle], wanted.min(axis=1), atol=1e-12)
+
+
 def test_points_far_beyond_a_sharp_rim_are_not_inside():
     """The nearest sample there is on a face that may face away."""
     cone, rng = trimesh.creation.cone(0.01, 0.1, sections=16), np.random.default_rng(7)
