@@ -125,7 +125,7 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(sc
         for index in range(ready):
             save(folder / f"{index:06d}.npz", RolloutMaker(scene).make(index))
         monkeypatch.setattr("neuralocks_core.training.train.discard", lambda work: None)
-        train_strands(scene, out, RegressionOptions(steps=40, clips=4, strands=4), rollouts=10)
+        train_strands(scene, out, RegressionOptions(steps=80, clips=4, strands=4), rollouts=10)
         graphs.append(model.read(out).graphs)
         assert model.read(out).meta["training"]["rollouts"] == 10
     assert graphs[0] == graphs[1]

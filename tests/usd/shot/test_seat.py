@@ -4,7 +4,6 @@
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
-from scipy.spatial import cKDTree
 
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
@@ -265,8 +264,8 @@ def test_a_crowds_skins_are_found_and_sorted_once_each(tmp_path, monkeypatch):
         prim.GetReferences().AddReference("./asset.usda")
         UsdGeom.Xformable(prim).AddTranslateOp().Set(Gf.Vec3d(number, 0, 0))
     stage.Save()
-    sorted_, tree = [], cKDTree
-    monkeypatch.setattr(skin, "cKDTree", lambda points: sorted_.append(len(points)) or tree(points))
+    sorted_, tree = [], skin.surface_tree
+    monkeypatch.setattr(skin, "surface_tree", lambda points: sorted_.append(len(points)) or tree(points))
     asked, bound = [], surface.bound_skeleton
     monkeypatch.setattr(surface, "bound_skeleton", lambda prim: asked.append(prim.GetPath()) or bound(prim))
     assert len(read_shot(stage.GetRootLayer().realPath).grooms) == 4
