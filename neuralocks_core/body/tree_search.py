@@ -12,7 +12,6 @@ SHARE = 1_000
 """Points that a thread is started for at least: few are found before others have started."""
 BLOCK = 1_000
 """Points that a thread looks for at a time: far from a dense body, thousands take a second, for which Ctrl-C would wait."""
-
 LEAF = 32
 """Points in a leaf of the tree."""
 

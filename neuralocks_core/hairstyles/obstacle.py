@@ -29,9 +29,10 @@ class Obstacle:
     """
 
     def __init__(self, scalp: Scalp, body: tuple[np.ndarray, np.ndarray] | None = None) -> None:
-        self._low, self._step, self._shape, grid = _grid(scalp.radius, scalp.head_centre)
+        self._low, self._step, axes = _grid(scalp.radius, scalp.head_centre)
+        self._shape = np.array([len(axis) for axis in axes])
         if body is None:
-            distance = _stand_in(grid, scalp)
+            distance = _stand_in(_nodes(axes), scalp)
         else:
             points, triangles = np.asarray(body[0], np.float64), np.asarray(body[1], np.int64)
             centre = tuple(map(float, scalp.head_centre))
@@ -74,19 +75,22 @@ class Obstacle:
         return points + np.maximum(margin - distance, 0.0)[:, None] * out
 
 
-def _grid(radius: float, centre: np.ndarray) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
-    """Low corner (3,) [m] of a grid around a head, its spacing [m], its numbers of nodes (3,), and all of them (N, 3) [m]."""
+def _grid(radius: float, centre: np.ndarray) -> tuple[np.ndarray, float, list[np.ndarray]]:
+    """Low corner (3,) of a grid around a head, its spacing, and the places of its nodes along x, y and z, all in [m]."""
     low, step = centre - radius * np.array([3.2, 7.0, 3.0]), _CELL * radius
     high = centre + radius * np.array([3.2, 2.2, 3.0])
-    axes = [np.arange(a, b, step) for a, b in zip(low, high, strict=True)]
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return low, step, np.array([len(axis) for axis in axes]), nodes
+    return low, step, [np.arange(a, b, step) for a, b in zip(low, high, strict=True)]
+
+
+def _nodes(axes: list[np.ndarray]) -> np.ndarray:
+    """All nodes (N, 3) of a grid."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 @lru_cache(maxsize=2)  # a second style on the same head takes a fraction of the time of the first
 def _distances(radius: float, centre: tuple[float, ...], points: bytes, triangles: bytes) -> np.ndarray:
     """`_to_surface` of the nodes of a head's grid."""
-    nodes = _grid(radius, np.array(centre))[-1]
+    nodes = _nodes(_grid(radius, np.array(centre))[-1])
     return _to_surface(nodes, np.frombuffer(points).reshape(-1, 3), np.frombuffer(triangles, np.int64).reshape(-1, 3))
 
 
