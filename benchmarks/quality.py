@@ -34,7 +34,8 @@ import plain_errors  # noqa: F401
 from real_grooms import on_head
 
 from neuralocks_core import metrics
-from neuralocks_core.animation.random_motion import FOREIGN, KINDS, WILD, scripted_clip
+from neuralocks_core.animation.gestures import FOREIGN, KINDS, WILD
+from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.deformation.suited import nearest

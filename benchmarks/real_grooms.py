@@ -50,9 +50,11 @@ def main() -> None:
     if arguments.begin and not arguments.train:
         parser.error("--begin goes with --train")
     print(
-        "| groom | strands | length, cm | rigid: position | " + " | ".join([*COLUMNS.values(), *INSIDE.values()]) + " |"
+        "| groom | model | strands | length, cm | rigid: position | "
+        + " | ".join([*COLUMNS.values(), *INSIDE.values()])
+        + " |"
     )
-    print("| --- |" + " ---: |" * (3 + len(COLUMNS) + len(INSIDE)))
+    print("| --- | --- |" + " ---: |" * (3 + len(COLUMNS) + len(INSIDE)))
     training = {"minutes": arguments.train, "begin": arguments.begin} if arguments.train else None
     for row in rows(arguments.files, arguments.model, arguments.frames, training):
         print("| " + " | ".join(v if isinstance(v, str) else f"{v:.3g}" for v in row.values()) + " |", flush=True)
@@ -60,6 +62,7 @@ def main() -> None:
 
 def rows(paths, model=None, frames=None, training: dict | None = None):
     """Yield the numbers of each file, by column; with `training`, those of a model trained for it."""
+    from neuralocks_core.deformation.suited import suited
     from usd.baking.bake import bake
     from usd.models.train import train
     from usd.review.evaluate import evaluate
@@ -80,6 +83,7 @@ def rows(paths, model=None, frames=None, training: dict | None = None):
             measured, compared = (next(iter(part.values())) for part in (card.grooms, card.compared))
             yield {
                 "groom": path.stem,
+                "model": suited(model, character, groom).stem,
                 "strands": str(measured["strands"]),
                 "length": 100 * float(np.median(lengths(groom))),
                 "rigid": compared["rigid"]["position_percent"],

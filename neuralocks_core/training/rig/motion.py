@@ -7,7 +7,8 @@ from dataclasses import asdict, astuple
 
 import numpy as np
 
-from neuralocks_core.animation.random_motion import KINDS, scripted_clip
+from neuralocks_core.animation.gestures import KINDS
+from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.reference.chain_contact import BodyPoints, Contacts

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from neuralocks_core.animation.cuts import find_cuts, find_flashes
-from neuralocks_core.animation.random_motion import KINDS, scripted_clip
+from neuralocks_core.animation.gestures import KINDS
+from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.motion import Clip

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from neuralocks_core import rotation
-from neuralocks_core.animation.random_motion import FOREIGN, KINDS, WILD, check_weights, random_clip, scripted_clip
+from neuralocks_core.animation.gestures import FOREIGN, KINDS, WILD
+from neuralocks_core.animation.random_motion import check_weights, random_clip, scripted_clip
 from neuralocks_core.errors import NeuralocksError
 from tests.core.rigs import HEAD, person
 

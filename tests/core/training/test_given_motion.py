@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from neuralocks_core.animation.random_motion import KINDS, scripted_clip
+from neuralocks_core.animation.gestures import KINDS
+from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.metrics import motion_error
 from neuralocks_core.motion import Clip
 from neuralocks_core.smooth_motion import SmoothMotion
