@@ -53,6 +53,8 @@ class Beside:
     def author(self, curves: UsdGeom.BasisCurves) -> None:
         """Write it to curves."""
         for *arguments, value in self.primvars:
+            # The groom's own, of another type, may be there already, and keeps its type.
+            curves.GetPrim().RemoveProperty(f"primvars:{arguments[0]}")
             UsdGeom.PrimvarsAPI(curves).CreatePrimvar(*arguments).Set(value)
         if self.purpose != UsdGeom.Tokens.default_:
             curves.CreatePurposeAttr(self.purpose)

@@ -10,23 +10,33 @@ TOGETHER = 1 << 14
 
 
 def batches(grooms: Sequence[StageGroom], moved_by: Callable[[StageGroom], Hashable]) -> list[list[StageGroom]]:
-    """Groups of grooms in their order: successive grooms of one head go together if the same model moves them.
+    """Groups of grooms: those of one head go together if the same model moves them.
 
     The groups depend on the grooms alone, not on what is baked of them, so every part of a bake has the same groups.
     """
+    return alike(
+        grooms, lambda item: (*_head(item), moved_by(item)), lambda item: item.groom.strand_count, most=TOGETHER
+    )
 
-    def key(item: StageGroom) -> tuple:
-        return _head(item), moved_by(item)
 
+def alike(
+    grooms: Sequence[StageGroom],
+    key: Callable[[StageGroom], Hashable],
+    strands: Callable[[StageGroom], int],
+    most: int,
+) -> list[list[StageGroom]]:
+    """Groups of grooms with one key, wherever they stand in the stage, in the order of their first ones. Several have no more than
+    so many strands in all.
+    """
     found: list[list[StageGroom]] = []
-    strands = 0
+    latest: dict[Hashable, tuple[list[StageGroom], int]] = {}
     for item in grooms:
-        strands += item.groom.strand_count
-        if found and key(found[-1][0]) == key(item) and strands <= TOGETHER:
-            found[-1].append(item)
-        else:
-            found.append([item])
-            strands = item.groom.strand_count
+        group, held = latest.get(key(item), ([], most + 1))
+        if held + strands(item) > most:
+            group, held = [], 0
+            found.append(group)
+        group.append(item)
+        latest[key(item)] = group, held + strands(item)
     return found
 
 

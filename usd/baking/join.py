@@ -290,5 +290,5 @@ def _all_gaps(plan: dict[Sdf.Path, dict[float, _Part]], frame: float, stage: Usd
 
 def _gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
     """The notes on frames of the shot that no part has."""
-    found = gaps(codes, frame, stage.GetStartTimeCode(), stage.GetEndTimeCode())
+    found = gaps(codes, frame, stage)
     return [f"no part has samples {', '.join(found[:4])}{', ...' if len(found) > 4 else ''}"] if found else []

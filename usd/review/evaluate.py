@@ -9,6 +9,7 @@ from neuralocks_core.evaluation.report import Card
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress, silent
 
+from ..baking.batches import alike
 from ..baking.movers import Movers
 from ..border.damage import names_damage
 from ..shot.recorded import recorded_material
@@ -72,25 +73,26 @@ def evaluate(
                 rows, tips = subject.compared(look, beside and beside.of(item))
                 compared[item.path] = rows
                 curves[item.path] |= tips
-    return Card(str(baked.shot.path), measured, compared, curves, tuple(notes))
+    rows = (_in_stage_order(baked, each) for each in (measured, compared, curves))
+    return Card(str(baked.shot.path), *rows, tuple(notes))
+
+
+def _in_stage_order(baked: Baked, rows: dict) -> dict:
+    return {item.path: rows[item.path] for item in baked.shot.grooms if item.path in rows}
 
 
 def _together(baked: Baked) -> list[tuple[Baked, list[StageGroom]]]:
-    """The grooms in their order; successive ones of one head, sampled at the same time codes, together as long as no more strands
-    of them are measured than of a large one.
+    """Those of one head, sampled at the same time codes, together as long as no more strands of them are measured than of a large
+    one.
     """
-    found: list[tuple[Baked, list[StageGroom]]] = []
-    strands = 0
-    for item in baked.shot.grooms:
-        own, few = baked.alone(item), min(item.groom.strand_count, STRANDS)
-        strands += few
-        if found and strands <= STRANDS and np.array_equal(found[-1][0].codes, own.codes):
-            if found[-1][1][0].attachment.character is item.attachment.character:
-                found[-1][1].append(item)
-                continue
-        found.append((own, [item]))
-        strands = few
-    return found
+    alone = {item.path: baked.alone(item) for item in baked.shot.grooms}
+    groups = alike(
+        baked.shot.grooms,
+        lambda item: (id(item.attachment.character), alone[item.path].codes.tobytes()),
+        lambda item: min(item.groom.strand_count, STRANDS),
+        most=STRANDS,
+    )
+    return [(alone[items[0].path], items) for items in groups]
 
 
 def _numbered(say: Progress, first: int, last: int, count: int) -> Progress:

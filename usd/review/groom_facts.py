@@ -91,10 +91,10 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
 
 def _samples(prim, border: Border) -> dict:
     """Which frames a bake holds."""
-    codes, stage = UsdGeom.BasisCurves(prim).GetPointsAttr().GetTimeSamples(), prim.GetStage()
+    codes = UsdGeom.BasisCurves(prim).GetPointsAttr().GetTimeSamples()
     if not codes:
         return {"number": 0}
-    missing = gaps(codes, border.frame, stage.GetStartTimeCode(), stage.GetEndTimeCode())
+    missing = gaps(codes, border.frame, prim.GetStage())
     return {"first": codes[0], "last": codes[-1], "number": len(codes), "missing": missing}
 
 

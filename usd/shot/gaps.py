@@ -2,16 +2,19 @@
 """Which frames a bake lacks."""
 
 import numpy as np
+from pxr import Usd
 
 
-def gaps(codes: list[float], frame: float, first: float, last: float) -> list[str]:
+def gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
     """Where samples are missing, in words such as "between 5 and 9"; regular steps of several frames are not gaps.
 
     Args:
         codes: time codes of a groom's samples, ascending.
         frame: time codes between two frames.
-        first, last: time codes of the shot's ends.
+        stage: the shot, whose ends count if it names them.
     """
+    named = stage.HasAuthoredTimeCodeRange()
+    first, last = (stage.GetStartTimeCode(), stage.GetEndTimeCode()) if named else (codes[0], codes[-1])
     frames = np.unique(np.floor((np.array(codes) - codes[0]) / frame + 1e-6)) * frame + codes[0]
     steps = np.diff(frames)
     usual = np.median(steps) if len(steps) > 1 else frame

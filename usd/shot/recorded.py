@@ -53,6 +53,12 @@ def seen_as_written(prim: Usd.Prim, border: Border) -> bool:
     return offset.IsIdentity() and (layer is None or not border.differing(layer))
 
 
+def in_stage(prim: Usd.Prim) -> bool:
+    """Whether a groom's bake is among the stage's own layers, not behind a reference, which may place it anywhere."""
+    layer = _strongest(prim)[2]
+    return layer is None or layer in prim.GetStage().GetLayerStack()
+
+
 def _strongest(prim: Usd.Prim) -> tuple:
     """What the strongest layer records, its offset, and the layer: composed, a bake over another would give a mixture of both."""
     stack = prim.GetPrimStackWithLayerOffsets()

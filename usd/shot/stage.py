@@ -16,7 +16,9 @@ from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.prim_paths import prim_path
 from ..border.stage_files import open_stage
+from ..border.time_codes import NEAR
 from ..border.units import Border
+from ..skel.cut_samples import within
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .attach import Attachment, off_head, rig_joint
@@ -214,9 +216,9 @@ def check_frames_named(subject, frames, first: float, last: float, rigs) -> None
 def check_cuts(cuts, rigs) -> None:
     """Refuse time codes of cuts at which no rig's animation could have one."""
     for cut in () if isinstance(cuts, dict) else cuts or ():
-        if not any(rig.time_codes[0] < cut <= rig.time_codes[-1] for rig in rigs):
+        if not any(within(cut, rig.time_codes, rig.border.frame) for rig in rigs):
             known = rigs[0].time_codes
-            begins = any(cut == rig.time_codes[0] for rig in rigs)
+            begins = any(abs(cut - rig.time_codes[0]) <= NEAR * rig.border.frame for rig in rigs)
             fact = "begins the animation" if begins else "lies outside the animation"
             raise NeuralocksError(
                 f"--cuts {cut:g}: {fact}, which goes from {known[0]:g} to {known[-1]:g}; "

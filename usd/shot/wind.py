@@ -12,7 +12,7 @@ from neuralocks_core.wind import Wind
 
 from ..border.amounts import check_number
 from ..border.units import Border
-from .recorded import recorded
+from .recorded import in_stage, recorded, seen_as_written
 
 
 def as_wind(mean, gusts: float | None = None) -> Wind | None:
@@ -52,11 +52,17 @@ def recorded_wind(prim: Usd.Prim, border: Border) -> Wind | None:
     """The wind that a bake was made with, in the core's axes; None for a calm.
 
     Raises:
-        NeuralocksError: what is recorded is not a wind.
+        NeuralocksError: what is recorded is not a wind, or the stage turns the bake, or plays it at another time: it does not tell
+            how, so nobody knows from where the wind blows then.
     """
     told = recorded(prim)
     if "wind" not in told:
         return None
+    if not seen_as_written(prim, border) or not in_stage(prim):
+        raise NeuralocksError(
+            f"{prim.GetPath()}: was baked in a wind, and is brought in here by a reference or with an offset, another unit or axis; "
+            "compare the bake's own file with the reference"
+        )
     try:
         return in_core(as_wind(tuple(told["wind"]), told.get("gusts")), border)
     except (NeuralocksError, TypeError) as error:

@@ -18,6 +18,7 @@ from ..border.units import Border
 from .bind_world import to_bind_world
 from .blend_shapes import all_shares, knot_weights
 from .clip_codes import clip_codes
+from .cut_samples import cut_samples
 from .joints import JointSource
 from .rig_copy import alike, hair_of, source_of
 from .stage_rig import StageRig, joint_trim
@@ -88,7 +89,8 @@ def read_rig(
         all_shares(weights[:, used], knots),
     )
     if cuts is not None:
-        known = border.seconds([cut for cut in sorted(cuts) if time_codes[0] < cut <= time_codes[-1]])
+        joint = character.head if "head" in humanoid else 0
+        known = clip.times[cut_samples(cuts, time_codes, border.frame, clip.joints[:, joint, :3, 3])]
     else:
         known = find_cuts(clip, character.head) if "head" in humanoid else ()
     clip = replace(clip, cuts=known)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One skeleton of a stage, as read."""
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -130,17 +131,20 @@ class StageRig:
         )
         notes = [f"{self.path}: its head jumps to another place at {self._named(cuts)}; {what}"] if len(cuts) else []
         if len(flashes):
-            every = self._named(np.union1d(cuts, flashes))
+            every = self._named(np.union1d(cuts, flashes), most=100)
             notes.append(
                 f"{self.path}: its head jumps at {self._named(flashes)}, less than {APART:g} s from one jump to the next, so these "
                 f"are not taken as cuts and the hair is flung; repair the animation, or name them all if they are (--cuts {every})"
             )
         return notes
 
-    def _named(self, times: np.ndarray) -> str:
+    def _named(self, times: np.ndarray, most: int = 8) -> str:
         """The time codes of samples of the clip [s], as `--cuts` takes them."""
         codes = self.time_codes[np.searchsorted(self.clip.times, times - 1e-9)]
-        return ",".join(f"{code:g}" for code in codes[:8]) + (", ..." if len(codes) > 8 else "")
+        digits = 3 + max(
+            0, math.ceil(-math.log10(self.border.frame))
+        )  # where a time code is a second, frames are its parts
+        return ",".join(f"{round(code, digits):.15g}" for code in codes[:most]) + (", ..." if len(codes) > most else "")
 
     @cached_property
     def carried(self) -> dict[int, Character]:

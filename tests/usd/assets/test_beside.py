@@ -52,6 +52,28 @@ def test_what_is_shown_at_some_time_is_shown(imported, switched):
     assert not notes
 
 
+_NAMES = Sdf.ValueTypeNames
+_GIVEN = [
+    ("groom_guide", _NAMES.BoolArray, "uniform", [True, False, False]),
+    ("groom_group_id", _NAMES.Int, "constant", 4),
+    ("groom_id", _NAMES.Int64Array, "uniform", [7, 8, 9]),
+    ("st", _NAMES.TexCoord2f, "constant", (0.5, 0.25)),
+    ("st", _NAMES.TexCoord3fArray, "uniform", [(0.5, 0.25, 0)] * 3),
+]
+
+
+@pytest.mark.parametrize("name, kind, interpolation, value", _GIVEN)
+def test_what_an_import_writes_itself_keeps_the_type_that_it_had(imported, name, kind, interpolation, value):
+    def change(stage):
+        api = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/Hero/Hair"))
+        api.CreatePrimvar(name, kind, interpolation).Set(value)
+
+    prim, _stage, _notes = imported(change)
+    primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)
+    assert (primvar.GetTypeName(), primvar.GetInterpolation()) == (kind, interpolation)
+    np.testing.assert_array_equal(primvar.Get(), value)
+
+
 def test_constant_primvars_of_the_prims_above_go_on(imported):
     """As renderers read them: the nearest counts, and only constant ones are inherited."""
     names = Sdf.ValueTypeNames

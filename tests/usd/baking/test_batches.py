@@ -13,6 +13,7 @@ import usd.shot.hair_search as hair_search
 import usd.shot.stage as stage_reading
 from neuralocks_core.deformation.resolve import Resolver
 from usd.baking.bake import bake
+from usd.baking.movers import Movers
 from usd.review.baked import read_baked
 from usd.review.evaluate import evaluate
 from usd.shot.stage import read_shot
@@ -51,12 +52,14 @@ def _curves(stage, path: str, points: np.ndarray, joint: int) -> None:
     binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
 
 
-def test_those_of_one_head_that_follow_each_other_are_together(shot, monkeypatch):
+def test_those_of_one_head_that_one_model_moves_are_together(shot, monkeypatch):
     def names(moved_by=lambda item: "a model"):
         return [[item.path[-1] for item in items] for items in batches.batches(read_shot(shot).grooms, moved_by)]
 
     assert names() == [["A", "B", "C"], ["e"]]
     assert names(lambda item: item.path == "/Hero/A") == [["A"], ["B", "C"], ["e"]]
+    # Hair of one kind does not lie side by side in the stage.
+    assert names(lambda item: item.path == "/Hero/B") == [["A", "C"], ["B"], ["e"]]
     monkeypatch.setattr(batches, "TOGETHER", 20)
     assert names() == [["A", "B"], ["C"], ["e"]]
 
@@ -94,8 +97,12 @@ def test_each_is_moved_as_if_it_were_alone(shot, tmp_path, model, monkeypatch, r
         assert np.ptp([samples(together, "points", at=code, prim=f"/Hero/{name}") for code in (1.0, 5.0)], axis=0).any()
 
 
-def test_an_interrupted_bake_goes_on(shot, tmp_path, model):
+@pytest.mark.parametrize("alternating", [False, True])
+def test_an_interrupted_bake_goes_on(shot, tmp_path, model, monkeypatch, alternating):
     out = tmp_path / "bake.usdc"
+    if alternating:  # of A and C together, then B
+        monkeypatch.setattr(Movers, "path", lambda self, item: self.asked.file.path.with_stem(str("B" in item.path)))
+        monkeypatch.setattr(Movers, "of", lambda self, item: self.asked)
     whole = bake(shot, out, model).path.read_bytes()
     out.unlink()
 
@@ -105,7 +112,7 @@ def test_an_interrupted_bake_goes_on(shot, tmp_path, model):
 
     with pytest.raises(KeyboardInterrupt):
         bake(shot, out, model, progress=stop)
-    assert bake(shot, out, model).resumed == 9
+    assert bake(shot, out, model).resumed == (10 if alternating else 9)  # a frame counts once for each groom of a batch
     assert out.read_bytes() == whole
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Strands of a character that is put elsewhere within a shot: the way there is none that hair or camera sees."""
 
+import re
+
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdSkel, Vt
@@ -78,6 +80,23 @@ def test_cuts_that_follow_each_other_at_once_are_told_with_what_makes_them_some(
     assert note in bake(layer.realPath, tmp_path / "out.usdc", model).notes
     given = bake(layer.realPath, tmp_path / "given.usdc", model, cuts=[13, 16])
     assert not any("its head" in note for note in given.notes)
+
+
+def test_a_cut_is_named_as_it_was_told(shots, tmp_path, model):
+    """Samples of a layer at another rate lie between the stage's frames."""
+    layer = Sdf.Layer.CreateNew(str(tmp_path / "faster.usda"))
+    layer.timeCodesPerSecond, layer.startTimeCode, layer.endTimeCode = 30000 / 1001, 2, 29
+    for name, value in (("metersPerUnit", 1.0), ("upAxis", "Y")):
+        layer.pseudoRoot.SetInfo(name, value)
+    Sdf.CreatePrimInLayer(layer, "/Hero").referenceList.Prepend(Sdf.Reference(str(shots[0]), "/Hero"))
+    layer.Save()
+    found = bake(layer.realPath, tmp_path / "found.usdc", model)
+    (told,) = re.findall(r"jumps to another place at ([\d.]+);", " ".join(found.notes))
+    assert float(told) == pytest.approx(CUT * 30000 / 1001 / 24, abs=5e-4) and round(float(told), 2) != float(told)
+    for named in (float(told), np.ceil(float(told))):
+        given = bake(layer.realPath, tmp_path / "given.usdc", model, cuts=[named])
+        for code in found.frames:
+            np.testing.assert_array_equal(*(samples(each.path, "points", at=code) for each in (found, given)))
 
 
 def test_velocities_do_not_span_a_cut(bakes):

@@ -134,6 +134,11 @@ def test_overlaps_and_gaps(shot, tmp_path, model):
     assert told["notes"] == ["no part has samples between 5 and 9"] and told["complete"] is False
     groom = inspect(tmp_path / "hair.usdc")["grooms"][0]
     assert groom["samples"] == {"first": 1, "last": 12, "number": 9, "missing": ["between 5 and 9"]}
+    layer = Sdf.Layer.FindOrOpen(str(tmp_path / "hair.usdc"))
+    layer.ClearStartTimeCode()
+    layer.ClearEndTimeCode()
+    layer.Export(str(tmp_path / "open.usda"))  # a stage that does not say where it ends lacks nothing before or after
+    assert inspect(tmp_path / "open.usda")["grooms"][0]["samples"]["missing"] == ["between 5 and 9"]
     whole = bake(shot, tmp_path / "whole.usdc", model).path
     for code in told["frames"]:
         assert (

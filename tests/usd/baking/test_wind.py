@@ -116,6 +116,18 @@ def test_a_bake_records_its_wind_and_a_report_compares_with_the_same(tmp_path):
     told = next(each for each in inspect(out)["grooms"] if each["path"] == HAIR)["baked with"]
     assert tuple(told["wind"]) == (0, -5, 2) and told["gusts"] == pytest.approx(0.8)
     assert evaluate(out, reference=True).compared[HAIR]["bake"]["position_percent"] < 0.15
+    for number, (key, value) in enumerate((("upAxis", "Y"), ("metersPerUnit", 1.0), ("offset", -20.0))):
+        above = Sdf.Layer.CreateNew(str(tmp_path / f"above_{number}.usda"))
+        stated = {"upAxis": "Z", "metersPerUnit": 0.01} | {key: value}
+        for name in ("upAxis", "metersPerUnit"):
+            above.pseudoRoot.SetInfo(name, stated[name])
+        above.timeCodesPerSecond = 24
+        above.subLayerPaths.append(str(out))
+        above.subLayerOffsets[0] = Sdf.LayerOffset(stated.get("offset", 0.0))
+        above.Save()
+        assert evaluate(above.realPath).grooms
+        with pytest.raises(NeuralocksError, match=f"{HAIR}: was baked in a wind, and .*; compare the bake's own file"):
+            evaluate(above.realPath, reference=True)
     layer = Sdf.Layer.FindOrOpen(str(out))
     facts = dict(layer.GetPrimAtPath(HAIR).customData[KEY])
     del facts["wind"], facts["gusts"]
