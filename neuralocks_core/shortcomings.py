@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a model's own report says against using it. A report is read from a file, and may contain anything."""
 
+import math
 from collections.abc import Mapping
 
 HELD, HELD_BEGUN = "held out", "held out, begun with"
@@ -55,7 +56,12 @@ def _of_a_rig(report: Mapping) -> list[str]:
 
 
 def _number(values, *names: str) -> float | None:
-    """The number under nested names in dicts; None if there is none."""
+    """The finite number under nested names in dicts; None if there is none."""
     for name in names:
         values = values.get(name) if isinstance(values, Mapping) else None
-    return values if isinstance(values, int | float) and not isinstance(values, bool) else None
+    if not isinstance(values, int | float) or isinstance(values, bool):
+        return None
+    try:
+        return float(values) if math.isfinite(values) else None
+    except OverflowError:  # a whole number may have any size
+        return None

@@ -43,17 +43,20 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
         prefix: prefix of every name in it, so that one program can use several models.
 
     Raises:
-        NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, another file has the example's
-            name, or the model reads inputs that the header does not compute.
+        NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, a file of somebody else's has the
+            header's or the example's name, or the model reads inputs that the header does not compute.
     """
     path = Path(path)
     if path.suffix not in (".h", ".hpp"):
-        raise NeuralocksError(f"{path}: a header ends in .h; choose such a name")
-    if re.search(r'["\\\x00-\x1f]', path.name):
-        raise NeuralocksError(f"{path.name!r}: no #include can name it; choose a name without quotes and backslashes")
+        raise NeuralocksError(f"{path}: a header ends in .h or .hpp; choose such a name")
+    if re.search(r'^-|["\\\x00-\x1f]', path.name):
+        raise NeuralocksError(
+            f"{path.name!r}: no #include or compiler can name it; choose a name without quotes, backslashes and a dash in front"
+        )
     beside = example_beside(path)
-    if beside.is_file() and not made_here(beside):
-        raise NeuralocksError(f"{beside}: would be overwritten by the worked example; move it, or name another header")
+    for file, what in ((path, "header"), (beside, "worked example")):
+        if file.is_file() and not made_here(file):
+            raise NeuralocksError(f"{file}: would be overwritten by the {what}; move it, or name another header")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
         raise NeuralocksError(f"--prefix {prefix}: is not a C name; use letters, digits and _")
     known = rig_spec(model.dynamic)

@@ -189,11 +189,14 @@ class RigModel:
     @classmethod
     def _of(cls, meta: dict) -> "RigModel":
         try:
+            with np.errstate(over="ignore"):  # what is too large becomes infinite, which is refused
+                layers = tuple((np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in meta["layers"])
+                limits = np.asarray(meta["limits"], np.float32)
             return cls(
                 HairChains.from_json(meta["chains"]),
                 BoundarySpec.from_json(meta["boundary"]),
-                tuple((np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in meta["layers"]),
-                np.asarray(meta["limits"], np.float32),
+                layers,
+                limits,
                 float(meta["max_angle"]),
                 *(meta[name] for name in ("training", "report", "credits")),
             )

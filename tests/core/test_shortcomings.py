@@ -23,6 +23,7 @@ SPRINGS = {"spring bones, best of 12 settings": 0.78, "spring bones, VRM's defau
         ({"tip_error_mm": {"network": 56.0, "rigid": 127.0}}, None),
         ({"tip_error_mm": {"network": 0.0, "rigid": 0.0}}, None),
         ({"motion_error": 3, "tip_error_mm": [1]}, None),
+        ({"motion_error": {"dynamic network": 10**400}, "tip_error_mm": {"network": 10**400, "rigid": 1}}, None),
         ({"motion_error": {"spring": "x", "dynamic network": "y"}, "tip_error_mm": {"network": None}}, None),
         ({}, None),
     ],
@@ -55,6 +56,9 @@ def test_of_strands(motion, begun, told):
     ] * bool(told)
 
 
-@pytest.mark.parametrize("report", [{"held out": 3}, {"held out": {"motion": "1.2"}}, {"held out": {"motion": True}}])
+_FORGED = [3, {"motion": "1.2"}, {"motion": True}, {"motion": 10**400}, {"motion": float("inf")}]
+
+
+@pytest.mark.parametrize("report", [{"held out": each} for each in _FORGED])
 def test_of_strands_with_a_forged_report(report):
     assert shortcomings("a.neuralocks", "strands", report) == []

@@ -19,6 +19,9 @@ from neuralocks_core.json_values import plain
 from ..border.stopping import deferred, stoppable, stopped
 from ..border.told_once import told_once
 
+LONGEST_LINE = 10_000
+"""Characters of a message; paths may have thousands."""
+
 
 def command_of(app: typer.Typer):
     """A decorator like `app.command(name)` for functions that raise NeuralocksError; `usd` says whether they need USD."""
@@ -114,8 +117,9 @@ def _as_typed(function, name: str) -> str:
 
 
 def one_line(text) -> None:
-    """Print to stderr, without line breaks."""
-    print(" ".join(str(text).split()), file=sys.stderr)
+    """Print to stderr, without line breaks, without what would steer a terminal, and not without end: names come from files."""
+    line = "".join(each if each.isprintable() else "?" for each in " ".join(str(text).split()))
+    print(line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}...", file=sys.stderr)
 
 
 def note(notes) -> None:

@@ -35,7 +35,8 @@ GRAPHS = {
     f"for the held bind pose (zeros if the model is not anchored), `edges` (S, {SHAPE}): rest[i] - rest[i-1] "
     f"with row 0 zero [m] -> `offsets` (S, {SHAPE}), `displacement` (S, {SHAPE}) in canonical space [m]",
     "rig.onnx": "`features` (B, F) of B characters -> `turns` (B, joints, 4) wxyz, joints as in the model's `chains`: local "
-    "rotation now = local rotation in the bind pose * turn. The C header of `neuralocks rig export-c` also computes the features",
+    "rotation now = local rotation in the bind pose * turn. The first layer is summed in float64 inside. The C header of `neuralocks "
+    "rig export-c` also computes the features",
 }
 
 _STEPS = {
@@ -74,6 +75,22 @@ _WIND = (
     f"a and b the sums of c sin(2 pi f t + phase), c {_listed(SHARES)}, f {_listed(FREQUENCIES)} Hz, phases {_listed(PHASES[0])} and "
     f"{_listed(PHASES[1])} rad; in a loop, each f is rounded to whole turns in its length, one at least"
 )
+_CUT = (
+    "where a character jumps to another place, hair starts anew: the cut is the first sample of a new clip, before which the "
+    "head moves in a straight line and does not turn. The sample before it is the last of the previous clip, after which the head "
+    "stands still. A bake finds cuts, or is given them (`--cuts`)"
+)
+
+
+def _game(kept: str) -> str:
+    return (
+        f"the clip is the motion so far: keep the samples of the last {kept} seconds. Add one whenever the animation "
+        "has been updated, with the time of that pose, and ask for the newest one's time: frames drawn between two updates would "
+        "look like stops. Add no pose that is not finite. Keep times in double. Clear the samples at a cut: with a single sample, "
+        "the head stands still"
+    )
+
+
 STRAND_INPUT = {
     "spaces": "R_j(t) = rotation of joint j in the world at t * inverse(its `bind`) * inverse(`facing`), " + _SPACES,
     "pose": "for each pose joint: column 0, then column 1, of T(R_head) R_j stance_j; stance is 1 except for upper arms",
@@ -114,14 +131,10 @@ SLIDERS = {
     "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
     "with vertices 0 and 1 at rest, each vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
     'it, scaled to the length that the edge has with D: its rest length, unless the model\'s `output` is "displacement"',
-    "a game": "the clip is the motion so far: keep the samples of the last (steps + 2) dt / sqrt(weight) seconds. Add one whenever the animation "
-    "has been updated, with the time of that pose, and ask for the newest one's time: frames drawn between two updates would "
-    "look like stops. Add no pose that is not finite. Keep times in double. Clear the samples at a cut",
+    "a game": _game("(steps + 2) dt / sqrt(weight)"),
     "blend shapes": "roots and `shape` here are those of the clip's first sample. If the animation changes blend shapes, a bake "
     "moves roots with the skin below them, and measures `shape` again in each frame",
-    "a cut": "where a character jumps to another place, hair starts anew: the cut is the first sample of a new clip, before which the "
-    "head moves in a straight line and does not turn. The sample before it is the last of the previous clip, after which the head "
-    "stands still. A bake finds cuts, or is given them (`--cuts`)",
+    "a cut": _CUT,
     "the body": "nothing here keeps strands out of it: that is a separate step of the bake (`--no-resolve` leaves it out)",
 }
 """What an artist or a game changes, and its effect on the inputs and outputs above."""
@@ -146,11 +159,14 @@ def described(file: model_file.ModelFile) -> dict:
         }
     else:
         result["features"] = _input(spec, ["pose", "gravity", "history"], RIG_INPUT, _PLACE)
-        result["features"]["how"]["history"] += (
-            ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained"
-        )
+        how = result["features"]["how"]
+        if spec.bins:
+            how["history"] += ". Motion strength is a factor of it: 0 is each pose as if held, 1 as trained"
+            how |= {"a cut": _CUT, "a game": _game("(steps + 2) dt")}
+        else:  # a pose has no history
+            del how["history"], how["clip"]
         if spec.feels_wind:
-            result["features"]["how"]["wind"] = _WIND
+            how["wind"] = _WIND
     meta = {name: value for name, value in file.meta.items() if name != "layers"}  # the weights, which rig.onnx has
     return result | {"model": meta | {"training": training}}
 

@@ -30,7 +30,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
 
     Args:
         model: path of a `.neuralocks` file; the shipped strand model if None, with a shot the one that suits its grooms.
-        folder: made if it does not exist; files of an earlier export are replaced.
+        folder: made if it does not exist; files of an earlier export are replaced, or removed if this one has no such files.
         shot: a USD file; the data of its grooms that is the same in every frame (`groom_tables`) is written, too.
         grooms, skeleton, head, joints: as for `bake`.
 
@@ -47,18 +47,17 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         raise NeuralocksError(
             "--groom, --skeleton, --head, --joint: choose within a shot; give it with --shot, or leave them out"
         )
-    if not _ours(folder / DESCRIPTION):
-        raise NeuralocksError(f"{folder / DESCRIPTION}: belongs to something else; move it, or choose another folder")
+    before = _told(folder / DESCRIPTION)
     read, mover = [], None
     if shot is not None:
         read, mover = _grooms(shot, model, grooms, skeleton, head, joints)
         file = mover.file
-    description, again = described(file), (folder / DESCRIPTION).exists()
+    description = described(file)
     tables = {}
     with ExitStack() as all_or_none:
 
         def put(name: str) -> Path:
-            if not again and (folder / name).is_file():
+            if before is None and (folder / name).is_file():
                 raise NeuralocksError(f"{folder / name}: belongs to something else; move it, or choose another folder")
             return all_or_none.enter_context(atomic_write(folder / name))
 
@@ -71,6 +70,9 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         for name, data in files.items():
             put(name).write_bytes(data)
         check()
+    # Beside graphs of another model, data of an earlier export would give wrong hair without a word.
+    for name in _written(before or {}) - {*files, *tables}:
+        (folder / name).unlink(missing_ok=True)
     return [folder / name for name in (*files, *tables)]
 
 
@@ -88,17 +90,32 @@ def _grooms(shot, model, *chosen) -> tuple[Sequence[StageGroom], StrandModel]:
     (mover, some), *others = movers.each(grooms)
     if others:
         raise NeuralocksError(
-            f"{some[0].path}, {others[0][1][0].path}: different shipped models suit them; export each with --groom, or name a MODEL"
+            f"{some[0].path}, {others[0][1][0].path}: different shipped models suit them; export each with --groom "
+            "into a folder of its own, or name a MODEL"
         )
     return grooms, mover
 
 
-def _ours(path: Path) -> bool:
-    """Whether a description may replace a file: it is one itself, or does not exist."""
+def _told(path: Path) -> dict | None:
+    """The description of an earlier export; None if there is none.
+
+    Raises:
+        NeuralocksError: the file is something else.
+    """
     if not path.exists():
-        return True
+        return None
     try:
         told = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError):
-        return False
-    return isinstance(told, dict) and {"units", "graphs", "model"} <= told.keys()
+        told = None
+    if not (isinstance(told, dict) and {"units", "graphs", "model"} <= told.keys()):
+        raise NeuralocksError(f"{path}: belongs to something else; move it, or choose another folder")
+    return told
+
+
+def _written(told: dict) -> set[str]:
+    """Names of the files that a description tells of: graphs and tables beside it, and nothing elsewhere, whatever it says."""
+    grooms = told.get("grooms")
+    parts = told.get("graphs"), grooms.get("files") if isinstance(grooms, dict) else None
+    names = {str(name) for part in parts if isinstance(part, dict) for name in part}
+    return {name for name in names if Path(name).name == name and Path(name).suffix in (".onnx", ".npz")}

@@ -5,6 +5,7 @@ Locks, scalp frames, resampling and body measures are computed once, here, so th
 vector and runs two graphs per frame, and gets the same hair as a bake.
 """
 
+import hashlib
 import re
 from collections.abc import Sequence
 
@@ -46,6 +47,8 @@ ARRAYS = {
     "lock_edges": f"(L, {SHAPE}) float32, as `edges`",
 }
 """Arrays of a groom's file -> what they are."""
+LONGEST_NAME = 150
+"""Bytes of a groom's file name without its ending, at most."""
 
 
 def export_grooms(grooms: Sequence[StageGroom], model: StrandModel, put) -> dict[str, dict]:
@@ -73,13 +76,21 @@ def file_names(paths: list[str]) -> list[str]:
     """A file name for each prim path; they differ in more than case, because some disks ignore case."""
     names: list[str] = []
     for path in paths:
-        stem = name = re.sub(r"\W+", "_", path.strip("/"))
+        stem = name = _short(re.sub(r"\W+", "_", path.strip("/")))
         number = 1
         while name.casefold() in {other.casefold() for other in names}:
             number += 1
             name = f"{stem}_{number}"
         names.append(name)
     return [f"{name}.npz" for name in names]
+
+
+def _short(stem: str) -> str:
+    """A name that disks, which allow 255 bytes, can hold: its end, which tells most, after a digest of the whole."""
+    if len(stem.encode()) <= LONGEST_NAME:
+        return stem
+    digest = hashlib.sha256(stem.encode()).hexdigest()[:8]
+    return f"{digest}_{stem.encode()[9 - LONGEST_NAME :].decode(errors='ignore')}"
 
 
 def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray], dict]:

@@ -87,13 +87,19 @@ def test_two_models_under_one_prefix_do_not_compile(tmp_path):
     assert done.returncode and "--prefix" in done.stderr
 
 
-def test_nobodys_own_file_is_written_over_by_the_example(tmp_path):
+def test_nobodys_own_file_is_written_over(tmp_path):
     (tmp_path / "hair_example.c").write_text("int mine;\n")
     with pytest.raises(NeuralocksError, match="hair_example.c: would be overwritten by the worked example"):
         export_c(random_model(), tmp_path / "hair.h")
     assert [file.name for file in tmp_path.iterdir()] == ["hair_example.c"]
-    with pytest.raises(NeuralocksError, match="no #include can name it"):
+    (tmp_path / "hair_example.c").rename(tmp_path / "hair.h")
+    with pytest.raises(NeuralocksError, match="hair.h: would be overwritten by the header"):
+        export_c(random_model(), tmp_path / "hair.h")
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["int mine;\n"]
+    with pytest.raises(NeuralocksError, match="no #include or compiler can name it"):
         export_c(random_model(), tmp_path / 'my "hair".h')
+    with pytest.raises(NeuralocksError, match="a dash in front"):
+        export_c(random_model(), tmp_path / "-hair.h")
 
 
 def test_what_no_header_computes_is_refused(tmp_path):

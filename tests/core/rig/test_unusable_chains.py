@@ -54,6 +54,15 @@ def test_a_model_for_other_chains_is_refused():
     assert HairChains.from_json(chains.to_json()).names == chains.names
 
 
+@pytest.mark.parametrize("axes", [0 * np.eye(3), 1e30 * np.eye(3), np.eye(3) + np.eye(3, k=1), np.diag([1.0, 1, -1])])
+def test_a_model_whose_bind_axes_are_no_rotation_is_refused(axes):
+    """Its rotations would be those of nothing."""
+    told = find_chains(character(tail("hair", 3))).to_json()
+    told["axes"] = [axes.tolist()] * len(told["names"])
+    with pytest.raises(NeuralocksError, match="bind axes are not those of a rotation; get an undamaged model"):
+        HairChains.from_json(told)
+
+
 def test_joints_called_alike_are_told_apart_by_what_they_hang_from():
     """A jaw's tip is not a lock's; if nothing distinguishes them, none is taken."""
     lock = [("hair", "head", (0, 1.6, -0.1)), ("tip", "hair", (0, 1.5, -0.1)), ("end", "tip", (0, 1.4, -0.1))]

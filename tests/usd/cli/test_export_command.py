@@ -30,6 +30,22 @@ def test_plain_onnx_with_its_description(tmp_path, model, capsys):
     assert status("export", "-o", tmp_path, "--groom", "/Hair") == 1 and "--shot" in capsys.readouterr().err
 
 
+def test_nothing_of_an_earlier_export_is_left_beside_other_graphs(tmp_path, model, capsys):
+    """Tables made for another model fit these, and give other hair."""
+    shot, out = write_shot(tmp_path), tmp_path / "out"
+    assert status("export", model, "-o", out, "--shot", shot) == 0
+    (out / "mine.npz").write_text("mine")
+    told = json.loads((out / "description.json").read_text())
+    assert list(told["grooms"]["files"]) == ["Hero_Hair.npz"]
+    told["grooms"]["files"] |= {"../shot.npz": {}, "notes.txt": {}}  # a forged one
+    for other in (tmp_path / "shot.npz", out / "notes.txt"):
+        other.write_text("mine")
+    (out / "description.json").write_text(json.dumps(told))
+    assert status("export", model_file.shipped("rig"), "-o", out) == 0
+    assert sorted(path.name for path in out.iterdir()) == ["description.json", "mine.npz", "notes.txt", "rig.onnx"]
+    assert (tmp_path / "shot.npz").exists()
+
+
 def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, capsys):
     shot, written, write = write_shot(tmp_path), [], Path.write_bytes
 

@@ -6,6 +6,7 @@ import os
 import pytest
 
 from neuralocks_core import model as model_file
+from usd.cli.command import one_line
 
 from ..commands import status
 from ..shots import write_shot
@@ -22,6 +23,13 @@ def test_errors_are_one_line_and_status_one(tmp_path, model, capsys):
         captured = capsys.readouterr()
         assert captured.out == "" and captured.err.count("\n") == 1 and captured.err.startswith("error: "), captured
         assert "nope" in captured.err
+
+
+def test_what_names_from_files_hold_does_not_reach_the_terminal(capsys):
+    one_line("error: joint '\x1b[31mred\x07' is\nmissing: \u00e9")
+    assert capsys.readouterr().err == "error: joint '?[31mred?' is missing: \u00e9\n"
+    one_line("a" * 10_000_000)
+    assert len(capsys.readouterr().err) < 20_000
 
 
 def test_names_that_are_no_text_are_refused_in_one_line(tmp_path, model, capsys):

@@ -3,6 +3,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import onnxruntime
@@ -19,6 +20,8 @@ from usd.models.export import export_model
 from usd.skel.clip_codes import CLOSE, STAND
 
 from ..shots import write_shot
+
+QUASI_STATIC = Path(__file__).resolve().parents[3] / "examples/mesh_hair/quasi_static.neuralocks"
 
 
 @pytest.mark.parametrize(
@@ -70,6 +73,20 @@ def test_the_description_of_a_rig_holds_no_weights(tmp_path):
     described = json.loads(path.read_text("utf-8"))
     model = described["model"]
     assert "layers" not in model and len(model["chains"]["axes"]) == len(RigModel.load().chains)
+
+
+def test_what_makes_hair_start_anew_is_told_of_rigs_too(tmp_path):
+    """And of those that answer to poses alone, neither that nor a history."""
+    export_model(model_file.shipped("rig"), tmp_path)
+    how = json.loads((tmp_path / "description.json").read_text("utf-8"))["features"]["how"]
+    assert (
+        "starts anew" in how["a cut"]
+        and "Clear the samples at a cut" in how["a game"]
+        and "weight" not in how["a game"]
+    )
+    export_model(QUASI_STATIC, tmp_path)
+    how = json.loads((tmp_path / "description.json").read_text("utf-8"))["features"]["how"]
+    assert not {"a cut", "a game", "history", "clip", "wind"} & set(how)
 
 
 def test_a_rig_is_fed_as_its_description_says(tmp_path):

@@ -35,3 +35,7 @@ def test_no_disk_takes_two_grooms_files_for_one():
     paths = ["/World/Hair", "/World/hair", "/World_Hair", "/World_Hair_2", "/World/Brows"]
     assert file_names(paths)[::4] == ["World_Hair.npz", "World_Brows.npz"]
     assert len({name.lower() for name in file_names(paths)}) == len(paths)
+    deep = [f"/{'A_group_of_groups/' * 20}{name}" for name in ("Hair", "Brows", "H\u00e4" * 90)]
+    names = file_names([*deep, deep[0].replace("A_", "B_", 1)])
+    assert len(set(names)) == 4 and max(len(name.encode()) for name in names) < 160
+    assert names[0].endswith("_A_group_of_groups_Hair.npz") and names[1].endswith("_Brows.npz")
