@@ -4,7 +4,8 @@
 from neuralocks_core.model import kind_known
 
 from .renewed import NOTE
-from .scene import imported
+from .scene import cached_strands, imported
+from .scene.attach import has_cache
 from .scene.muting import off_meanwhile
 from .session import session
 
@@ -22,6 +23,8 @@ def hair_notes(hair) -> list[str]:
             found.append("The model is for held poses, so this hair feels no wind")
     if hair.name_full in session.renewed and own.live and not own.model.strip():
         found.append(NOTE)
+    if has_cache(hair) and cached_strands.changed(hair.data):
+        found.append("Its strands were changed since the bake, so its cache is off; press Bake and Attach again")
     if off := off_meanwhile(hair):
         found.append(f"Off while Live, or the hair would move twice: {', '.join(off)}")
     if own.armature is not None and (doubt := imported.doubt(hair)):

@@ -12,6 +12,7 @@ from .live_strands import EDITING, known, live_hairs, show_all_rest, show_rest_l
 from .models import SETTING
 from .scene import blur
 from .scene.appended import remake
+from .scene.attach import switch_changed
 from .scene.carried import bodies_of
 from .scene.last_called import go_last, others_called
 from .scene.layers import working_in
@@ -40,6 +41,12 @@ def on_frame(scene, graph=None):
         _unseen(graph.update)
     live.update(scene, graph, moved=True)
     _catch_up()
+
+
+@persistent
+def before_update(*_):
+    """What was edited is about to be evaluated."""
+    switch_changed()
 
 
 @persistent
@@ -197,6 +204,7 @@ def _edited(thing) -> bool:
 HANDLERS = {
     "frame_change_pre": before_frame,
     "frame_change_post": on_frame,
+    "depsgraph_update_pre": before_update,
     "depsgraph_update_post": on_update,
     "load_post": on_load,
     "undo_post": on_undo,

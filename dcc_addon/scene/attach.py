@@ -8,7 +8,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
-from . import blur
+from . import blur, cached_strands
 from .muting import CACHE as MODIFIER
 from .muting import mute_deformers, off_meanwhile, unmute_deformers
 from .paths import full
@@ -88,7 +88,7 @@ def renew(path: str, prims: dict[str, str]) -> None:
         prim = prims.get(hair.name_full, modifier.object_path)
         if modifier.object_path != prim:
             modifier.object_path = prim
-        blur.attach(hair)
+        _show(hair, modifier)
     if playing:
         read_again({hair.modifiers[MODIFIER].cache_file for hair in playing})
 
@@ -102,13 +102,29 @@ def attach(hair, path: str, prim: str, scene) -> None:
     cache.scale = 1.0
     _follow_time(cache, scene)
     modifier = hair.modifiers.get(MODIFIER) or hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")
-    modifier.show_viewport = modifier.show_render = True
     modifier.cache_file = cache
     modifier.object_path = prim
     if len(hair.modifiers) > 1 and _original(hair, modifier) is None:
         index = hair.modifiers.find(MODIFIER)
         if hasattr(hair.modifiers, "move"):
             hair.modifiers.move(index, 0)
+    _show(hair, modifier)
+
+
+def switch_changed() -> None:
+    """Switch caches off whose hair has other strands now, before Blender evaluates them, and on again if these come back."""
+    for data, on in cached_strands.to_switch():
+        for thing in bpy.data.objects:
+            if thing.data == data and has_cache(thing):
+                modifier = thing.modifiers[MODIFIER]
+                modifier.show_viewport = modifier.show_render = on
+
+
+def _show(hair, modifier) -> None:
+    """Play a cache that was baked for the hair as it is."""
+    cached_strands.remember(hair.data)
+    if not (modifier.show_viewport and modifier.show_render):
+        modifier.show_viewport = modifier.show_render = True
     blur.attach(hair)
 
 
@@ -118,6 +134,7 @@ def detach(hair) -> bool:
     if not has_cache(hair):  # it may have been removed by hand
         unmute_deformers(hair, REPLACED)
         return False
+    cached_strands.forget(hair.data)
     modifier = hair.modifiers[MODIFIER]
     cache, original = modifier.cache_file, _original(hair, modifier)
     if original is None:

@@ -109,7 +109,7 @@ def keep_rest(data, whole: bool = False) -> None:
             f"{data.name}: its curves are linked from another file and cannot be moved here; make them local (Object > "
             f"Relations > Make Local > Selected Objects and Data), or use Bake and Attach{moved}"
         )
-    if data.users - data.use_fake_user > 1:
+    if unbound.shared(data):
         raise NeuralocksError(
             f"{data.name}: several objects share these curves, and none can move alone; make them single user (Object > "
             "Relations > Make Single User > Object & Data)"

@@ -20,7 +20,7 @@ def step(scene, frame: float) -> None:
 
 class stepping:
     """While frames are stepped: the live view is off, hair bones are turned as without it and without baked keys, and the
-    current frame comes back at the end, with poses that are not keyed.
+    current frame comes back at the end, with poses that are not keyed and the camera, which markers may have changed.
     """
 
     def __init__(self, scene):
@@ -29,6 +29,7 @@ class stepping:
     def __enter__(self):
         self._frame = self._scene.frame_current + self._scene.frame_subframe  # before frame 0, the fraction is negative
         self._unkeyed = Unkeyed(self._scene)
+        self._camera = self._scene.camera and self._scene.camera.name_full
         self._live = {}
         for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and o.neuralocks_character.rig_kept):
             text = armature.neuralocks_character.rig_kept
@@ -44,9 +45,15 @@ class stepping:
             self._keyed.close()
             step(self._scene, self._frame)
             self._unkeyed.put_back()
+            self._give_back_camera()
             for name, turned in self._live.items():
                 if (armature := find(name)) is not None:
                     rotations.give_back(armature, turned)
             bpy.context.view_layer.update()  # what is restored is not an edit of the artist's
         finally:
             session.paused -= 1
+
+    def _give_back_camera(self) -> None:
+        camera = find(self._camera) if self._camera else None
+        if self._scene.camera != camera and bool(camera) == bool(self._camera):
+            self._scene.camera = camera

@@ -3,12 +3,19 @@
 UV map name unchanged. The name is kept in a property of the Curves, so it is saved, appended and undone with the hair.
 """
 
+import bpy
+
 
 def possible(data) -> bool:
     """Whether these Curves can be changed without changing another object's."""
-    if data.library is not None or data.override_library is not None or data.users - data.use_fake_user > 1:
+    if data.library is not None or data.override_library is not None or shared(data):
         return False
     return hasattr(data, "surface_uv_map")
+
+
+def shared(data) -> bool:
+    """Whether several objects have these Curves. Blender counts their users, but one too many after its own Separate."""
+    return data.users - data.use_fake_user > 1 and sum(thing.data == data for thing in bpy.data.objects) > 1
 
 
 def unbind(data, kept: str) -> None:

@@ -124,6 +124,24 @@ def not_keyed(_folder: Path) -> None:
     assert not (lost := [owner for owner in owners if owner["value"] != 2.0]), lost
 
 
+def seen_by_another_camera(_folder: Path) -> None:
+    """Sampling steps through frames at which markers change the camera; afterwards it is the one that the artist chose."""
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    scenes.hair(rig, 4)
+    cameras = [bpy.data.objects.new(name, bpy.data.cameras.new(name)) for name in "ABC"]
+    for camera, frame in zip(cameras, (1, 12, 0), strict=True):
+        scene.collection.objects.link(camera)
+        if frame:
+            scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+    scene.frame_set(5)
+    scene.neuralocks.armature = rig
+    for chosen in (cameras[2], cameras[0], None):
+        scene.camera = chosen
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        assert scene.camera == chosen and scene.frame_current == 5
+
+
 def between_frames(_folder: Path) -> None:
     """Sampling ends at the frame and fraction that were shown, also before frame 0, where Blender's fractions are negative."""
     rig, scene = scenes.armature(), bpy.context.scene

@@ -3,6 +3,7 @@
 
 import shutil
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 import numpy as np
@@ -63,6 +64,35 @@ def other_strands(folder: Path) -> None:
     strands.use_fake_user = True
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "left.blend"))
     assert not curves.has_rest(short), "hair that is in no scene is saved at rest"
+
+
+def separated(_folder: Path) -> None:
+    """Blender's own Separate leaves both parts live, although it then counts a user too many; really shared curves are refused."""
+    if "separate" not in dir(bpy.ops.curves):
+        raise SkipTest("this Blender separates no strands")
+    rig = scenes.armature()
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    make_live(rig, strands)
+    points_at(strands, 9)
+    bpy.context.view_layer.objects.active = strands
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.curves.set_selection_domain(domain="CURVE")
+    bpy.ops.curves.select_all(action="DESELECT")
+    for index in range(5):
+        strands.data.attributes[".selection"].data[index].value = True
+    bpy.ops.curves.separate()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    assert [len(data.curves) for data in bpy.data.hair_curves] == [15, 5]
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"} and not messages(), messages()
+    for part in (thing for thing in bpy.data.objects if thing.type == "CURVES"):
+        assert apart(points_at(part, 9), points_at(part, 1)) > 1e-3, part.name
+    copy = strands.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    points_at(strands, 5)
+    assert any("several objects share these curves" in text for text in messages().values()), messages()
 
 
 def replaced_model(folder: Path) -> None:
