@@ -79,9 +79,10 @@ class Bench:
                 n: replace(g, rest=maker.fitted(g.rest.astype(float), self.shape).astype(np.float32))
                 for n, g in self.styles.items()
             }
-        self.chosen = {name: self._locks(groom) for name, groom in self.styles.items()}
+        self.chosen = {name: self.locks(groom) for name, groom in self.styles.items()}
 
-    def _locks(self, groom) -> np.ndarray:
+    def locks(self, groom) -> np.ndarray:
+        """Indices of its strands that are measured."""
         usable = held_out_split(groom, True)
         order = np.random.default_rng(SEED).permutation(np.unique(groom.lock[usable]))
         rank = np.argsort(order)[np.searchsorted(np.sort(order), groom.lock[usable])]

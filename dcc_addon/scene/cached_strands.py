@@ -33,7 +33,8 @@ def changed(data) -> bool:
 
 def to_switch() -> list[tuple]:
     """All Curves whose cache should be switched off, or, after an undo, on again, with whether on; that counts as done."""
-    found = [(data, not changed(data)) for data in bpy.data.hair_curves if changed(data) != (OFF in data)]
+    own = (data for data in bpy.data.hair_curves if data.library is None)
+    found = [(data, not changed(data)) for data in own if changed(data) != (OFF in data)]
     for data, on in found:
         if on:
             data.pop(OFF)

@@ -14,12 +14,12 @@ def batches(grooms: Sequence[StageGroom], moved_by: Callable[[StageGroom], Hasha
 
     The groups depend on the grooms alone, not on what is baked of them, so every part of a bake has the same groups.
     """
-    return alike(
+    return grouped(
         grooms, lambda item: (*_head(item), moved_by(item)), lambda item: item.groom.strand_count, most=TOGETHER
     )
 
 
-def alike(
+def grouped(
     grooms: Sequence[StageGroom],
     key: Callable[[StageGroom], Hashable],
     strands: Callable[[StageGroom], int],

@@ -9,7 +9,7 @@ from neuralocks_core.evaluation.report import Card
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress, silent
 
-from ..baking.batches import alike
+from ..baking.batches import grouped
 from ..baking.movers import Movers
 from ..border.damage import names_damage
 from ..shot.recorded import recorded_material
@@ -86,7 +86,7 @@ def _together(baked: Baked) -> list[tuple[Baked, list[StageGroom]]]:
     one.
     """
     alone = {item.path: baked.alone(item) for item in baked.shot.grooms}
-    groups = alike(
+    groups = grouped(
         baked.shot.grooms,
         lambda item: (id(item.attachment.character), alone[item.path].codes.tobytes()),
         lambda item: min(item.groom.strand_count, STRANDS),

@@ -8,7 +8,7 @@ import numpy as np
 from ..border.time_codes import NEAR
 
 
-def cut_samples(cuts: Sequence[float], codes: np.ndarray, frame: float, places: np.ndarray) -> np.ndarray:
+def cut_samples(cuts: Sequence[float], codes: np.ndarray, frame: float, poses: np.ndarray) -> np.ndarray:
     """Indices (C,) of samples, ascending; cuts that are not `within` the animation are left out.
 
     A user names the first frame that shows the new place. If no sample lies there, it is the one of those in the frame before and
@@ -18,9 +18,9 @@ def cut_samples(cuts: Sequence[float], codes: np.ndarray, frame: float, places: 
         cuts: time codes.
         codes: (T,) time codes of the samples, ascending.
         frame: time codes from one frame to the next.
-        places: (T, 3) of the head.
+        poses: (T, n) of the head: its place, and its axes if it may only turn.
     """
-    steps = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=1)
+    steps = np.linalg.norm(np.diff(poses, axis=0, prepend=poses[:1]), axis=1)
     found = set()
     for cut in cuts:
         if not within(cut, codes, frame):

@@ -90,7 +90,7 @@ def read_rig(
     )
     if cuts is not None:
         joint = character.head if "head" in humanoid else 0
-        known = clip.times[cut_samples(cuts, time_codes, border.frame, clip.joints[:, joint, :3, 3])]
+        known = clip.times[cut_samples(cuts, time_codes, border.frame, clip.joints[:, joint].reshape(-1, 16))]
     else:
         known = find_cuts(clip, character.head) if "head" in humanoid else ()
     clip = replace(clip, cuts=known)

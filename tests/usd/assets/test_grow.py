@@ -80,11 +80,14 @@ def test_each_style_moves_by_the_model_that_moves_it_best():
     barber = Barber(character)
     kinds = {s: suited(None, character, barber.grow(s, 300, seed=7001)).stem for s in STYLES}
     learned = {
-        "strands": ["tight_curls"],
-        "strands_long": ["long_straight", "wavy", "fringe", "braid"],
-        "strands_short": ["bob", "pixie", "mohawk"],
-        "strands_curly": ["coils", "afro"],
-        "strands_tied": ["ponytail", "bun"],
+        "strands_long": ["long_straight", "wavy", "braid"],
+        "strands_fringed": ["fringe"],
+        "strands_short": ["bob", "pixie"],
+        "strands_spiked": ["mohawk"],
+        "strands_curly": ["tight_curls"],
+        "strands_coily": ["coils", "afro"],
+        "strands_tied": ["ponytail"],
+        "strands_pinned": ["bun"],
     }
     assert kinds == {style: kind for kind, styles in learned.items() for style in styles}
 

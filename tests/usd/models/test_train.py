@@ -58,7 +58,7 @@ def test_what_is_named_is_taken_or_refused(tmp_path):
 @pytest.mark.parametrize(
     "grooms, begin, taken",
     [
-        (["coils"], "shipped", "strands_curly"),
+        (["coils"], "shipped", "strands_coily"),
         (["coils", "bob"], None, "strands"),
         (["coils"], str(model.shipped()), "strands"),
     ],
@@ -75,7 +75,7 @@ def test_of_the_shipped_models_it_is_the_one_that_knows_such_hair(grooms, begin,
     monkeypatch.setattr("usd.models.training_scene.MOST_STRANDS", 40)
     train(BODY, grooms, [], tmp_path / "own.neuralocks", {}, begin=begin, tell=told.extend)
     assert begun == [taken]
-    assert any("curly hair" in note for note in told) == (taken == "strands_curly")
+    assert any("coily hair" in note for note in told) == (taken == "strands_coily")
 
 
 def test_what_a_training_should_know_is_told_before_it(tmp_path):
