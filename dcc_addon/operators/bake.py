@@ -164,7 +164,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
             written |= prims
             notes += [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in result.notes]
     for out in outs:
-        attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()})
+        attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()}, scene)
     return Baked(baked, list(dict.fromkeys(notes)), written)
 
 

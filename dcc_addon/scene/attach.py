@@ -80,17 +80,23 @@ def is_imported(path: str) -> bool:
     return False
 
 
-def renew(path: str, prims: dict[str, str]) -> None:
+def renew(path: str, prims: dict[str, str], scene) -> None:
     """Show what has just been written to the USD file `path` on the hair that plays it: its prim of `prims`, by its name."""
     playing = players(path)
+    # A cache that is off still holds the strands of before, until it is removed.
+    other = [hair for hair in playing if cached_strands.is_off(hair.data)]
+    playing = [hair for hair in playing if hair not in other]
     for hair in playing:
         modifier = hair.modifiers[MODIFIER]
         prim = prims.get(hair.name_full, modifier.object_path)
         if modifier.object_path != prim:
             modifier.object_path = prim
-        _show(hair, modifier)
+        blur.attach(hair)
     if playing:
         read_again({hair.modifiers[MODIFIER].cache_file for hair in playing})
+    for hair in other:
+        if hair.name_full in prims:
+            attach(hair, path, prims[hair.name_full], scene)
 
 
 def attach(hair, path: str, prim: str, scene) -> None:
@@ -102,13 +108,15 @@ def attach(hair, path: str, prim: str, scene) -> None:
     cache.scale = 1.0
     _follow_time(cache, scene)
     modifier = hair.modifiers.get(MODIFIER) or hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")
+    modifier.show_viewport = modifier.show_render = True
     modifier.cache_file = cache
     modifier.object_path = prim
     if len(hair.modifiers) > 1 and _original(hair, modifier) is None:
         index = hair.modifiers.find(MODIFIER)
         if hasattr(hair.modifiers, "move"):
             hair.modifiers.move(index, 0)
-    _show(hair, modifier)
+    cached_strands.remember(hair.data)
+    blur.attach(hair)
 
 
 def switch_changed() -> None:
@@ -118,14 +126,6 @@ def switch_changed() -> None:
             if thing.data == data and has_cache(thing):
                 modifier = thing.modifiers[MODIFIER]
                 modifier.show_viewport = modifier.show_render = on
-
-
-def _show(hair, modifier) -> None:
-    """Play a cache that was baked for the hair as it is."""
-    cached_strands.remember(hair.data)
-    if not (modifier.show_viewport and modifier.show_render):
-        modifier.show_viewport = modifier.show_render = True
-    blur.attach(hair)
 
 
 def detach(hair) -> bool:

@@ -31,10 +31,15 @@ def changed(data) -> bool:
     return told is not None and list(told) != _sizes(data)
 
 
+def is_off(data) -> bool:
+    """Whether their cache was switched off for that."""
+    return OFF in data
+
+
 def to_switch() -> list[tuple]:
     """All Curves whose cache should be switched off, or, after an undo, on again, with whether on; that counts as done."""
     own = (data for data in bpy.data.hair_curves if data.library is None)
-    found = [(data, not changed(data)) for data in own if changed(data) != (OFF in data)]
+    found = [(data, not changed(data)) for data in own if changed(data) != is_off(data)]
     for data, on in found:
         if on:
             data.pop(OFF)

@@ -77,8 +77,8 @@ class HairChains:
             raise NeuralocksError("hair chains: a joint is in another chain than its parent; get an undamaged model")
         if not all(np.isfinite(getattr(self, name)).all() for name in ("origins", "axes", "bones")):
             raise NeuralocksError("hair chains: NaN or infinity in the bind pose; repair the skeleton")
-        far = np.abs(self.axes.clip(-2, 2) @ self.axes.clip(-2, 2).swapaxes(1, 2) - np.eye(3)).max()
-        if far > 1e-3 or np.linalg.det(self.axes).min() < 0:
+        axes = self.axes.clip(-2, 2)  # the product of larger ones may overflow
+        if np.abs(axes @ axes.swapaxes(1, 2) - np.eye(3)).max() > 1e-3 or np.linalg.det(axes).min() < 0:
             raise NeuralocksError("hair chains: bind axes are not those of a rotation; get an undamaged model")
 
     def __len__(self) -> int:

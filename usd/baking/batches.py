@@ -31,12 +31,13 @@ def grouped(
     found: list[list[StageGroom]] = []
     latest: dict[Hashable, tuple[list[StageGroom], int]] = {}
     for item in grooms:
-        group, held = latest.get(key(item), ([], most + 1))
-        if held + strands(item) > most:
+        own, count = key(item), strands(item)
+        group, held = latest.get(own, ([], most + 1))
+        if held + count > most:
             group, held = [], 0
             found.append(group)
         group.append(item)
-        latest[key(item)] = group, held + strands(item)
+        latest[own] = group, held + count
     return found
 
 

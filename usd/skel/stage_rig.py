@@ -141,9 +141,8 @@ class StageRig:
     def _named(self, times: np.ndarray, most: int = 8) -> str:
         """The time codes of samples of the clip [s], as `--cuts` takes them."""
         codes = self.time_codes[np.searchsorted(self.clip.times, times - 1e-9)]
-        digits = 3 + max(
-            0, math.ceil(-math.log10(self.border.frame))
-        )  # where a time code is a second, frames are its parts
+        # Where a time code is a second, frames are its parts.
+        digits = 3 + max(0, math.ceil(-math.log10(self.border.frame)))
         return ",".join(f"{round(code, digits):.15g}" for code in codes[:most]) + (", ..." if len(codes) > most else "")
 
     @cached_property

@@ -344,4 +344,9 @@ def other_strands_than_baked(folder: Path) -> None:
     assert ops.neuralocks.bake_attach() == {"FINISHED"} and is_shown()
     assert apart(points_at(strands(), 9), points_at(strands(), 1)) > 1e-3 and len(points_at(strands(), 9)) == 8 * 24
     assert note not in drawn("INFO"), (dict(strands().data.items()), drawn("INFO"))
+    keep(6)
+    assert ops.neuralocks.bake() == {"FINISHED"} and is_shown(), "the same file holds the new strands"
+    cache = strands().modifiers["Neuralocks Cache"]
+    cache.show_viewport = cache.show_render = False
+    assert ops.neuralocks.bake() == {"FINISHED"} and not is_shown(), "the artist has hidden it"
     assert not messages(), messages()
