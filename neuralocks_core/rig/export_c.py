@@ -35,7 +35,7 @@ def made_here(path) -> bool:
 
 
 def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
-    """Write `path` (ends in .h) and `<path>_example.c` beside it.
+    """Write `path` (ends in .h or .hpp) and `example_beside` it.
 
     Args:
         model: the trained model.
@@ -72,8 +72,8 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
 
 
 def example_beside(path: Path) -> Path:
-    """The file of the worked example of a header."""
-    return path.with_name(f"{path.stem}_example.c")
+    """The file of the worked example of a header: C++ beside an .hpp, else C."""
+    return path.with_name(f"{path.stem}_example.{'cpp' if path.suffix == '.hpp' else 'c'}")
 
 
 def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
@@ -207,6 +207,7 @@ def _example(model: RigModel, header: str, prefix: str) -> str:
     text = _parts_for(model, (_TEXTS / "example.c.in").read_text(encoding="utf-8"))
     beside = example_beside(Path(header))
     names = {
+        "COMPILER": "c++ -std=c++11" if beside.suffix == ".cpp" else "cc -std=c99",
         "HEADER": header,
         "SOURCE": shlex.quote(beside.name),
         "PROGRAM": shlex.quote(beside.stem),

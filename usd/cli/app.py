@@ -15,7 +15,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from .assets import body_command, grow_command, import_command
 from .bake import bake_command, join_command, simulate_command
-from .command import command_of, note, one_line, print_json
+from .command import command_of, note, one_line, print_json, say
 from .options import (
     AsJson,
     Grooms,
@@ -86,7 +86,7 @@ def _version(wanted: bool) -> None:
             number = version("neuralocks")
         except PackageNotFoundError:
             number = "of a source tree that is not installed"
-        typer.echo(f"neuralocks {number}")
+        say(f"neuralocks {number}")
         raise typer.Exit
 
 
@@ -114,7 +114,7 @@ def inspect_command(
     if as_json:
         print_json(facts)
     else:
-        typer.echo(as_text(facts))
+        say(as_text(facts))
 
 
 @command("evaluate")
@@ -152,7 +152,7 @@ def evaluate_command(
     if as_json:
         typer.echo(card.to_json())
     else:
-        typer.echo(card.text(encoding=sys.stdout.encoding))
+        say(card.text(encoding=sys.stdout.encoding))
     if plot is not None:
         card.plot(plot)
 
@@ -192,7 +192,7 @@ def preview_command(
             tell=note,
             progress=progress,
         )
-    typer.echo(str(out))
+    say(str(out))
 
 
 @command("export")
@@ -216,7 +216,7 @@ def export_command(
     for path in export_model(
         model, out, shot, grooms=groom, skeleton=skeleton, head=head, joints=pairs(joint, "--joint")
     ):
-        typer.echo(str(path))
+        say(str(path))
 
 
 @command("demo")
@@ -238,10 +238,10 @@ def demo_command(
         seconds = {name: round(value, 2) for name, value in done.seconds.items()}
         print_json({"shot": str(done.shot), "outputs": outputs, "seconds": seconds, "notes": notes})
         return
-    typer.echo(done.card.text(encoding=sys.stdout.encoding))
+    say(done.card.text(encoding=sys.stdout.encoding))
     for name, path in {"shot": str(done.shot), **outputs}.items():
         took = f" ({done.seconds[name]:.1f} s)" if name in done.seconds else ""
-        typer.echo(f"{name}: {path}{took}")
+        say(f"{name}: {path}{took}")
 
 
 # The order in which help lists them: those needed first, then the rest.

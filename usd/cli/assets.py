@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .command import note, print_json
+from .command import note, print_json, say
 from .options import AsJson, Head, Out, Seed, Skeleton, WithCharacter, numbers
 
 
@@ -51,7 +51,7 @@ def import_command(
         print_json({"path": str(out), "grooms": [groom_facts(g) for g in grooms], "notes": notes})
     else:
         for groom in grooms:
-            typer.echo(f"{out}: {groom.strand_count} strands, {len(groom.points)} vertices of {groom.name}")
+            say(f"{out}: {groom.strand_count} strands, {len(groom.points)} vertices of {groom.name}")
 
 
 def grow_command(
@@ -77,7 +77,7 @@ def grow_command(
             style, character, out, count, seed,
             variation=variation, skeleton=skeleton, head=head, with_character=with_character, tell=note, progress=progress,
         )  # fmt: skip
-    typer.echo(str(path))
+    say(str(path))
 
 
 def body_command(
@@ -87,4 +87,4 @@ def body_command(
     """Write the statistical body anny as a USD character (extra 'body')."""
     from ..assets.body import write_body
 
-    typer.echo(str(write_body(out, phenotype=numbers(phenotype, "--phenotype") or None)))
+    say(str(write_body(out, phenotype=numbers(phenotype, "--phenotype") or None)))

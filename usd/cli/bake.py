@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .command import counted, note, noting_when_cut_short, print_json
+from .command import counted, note, noting_when_cut_short, print_json, say
 from .options import (
     AsJson,
     Cuts,
@@ -89,7 +89,7 @@ def join_command(
     if as_json:
         print_json(vars(result) | {"path": str(result.path)})
     else:
-        typer.echo(f"{result.path}: {_span(result.frames)} of {counted(len(parts), 'part')}")
+        say(f"{result.path}: {_span(result.frames)} of {counted(len(parts), 'part')}")
 
 
 def simulate_command(
@@ -151,9 +151,9 @@ def _bake_report(result, as_json: bool) -> None:
         return
     for groom in result.grooms:
         by = f", moved by the model {groom['model']}" if "model" in groom else ""
-        typer.echo(f"{groom['path']}: {groom['strands']} strands, carried by {groom['how']}{by}")
+        say(f"{groom['path']}: {groom['strands']} strands, carried by {groom['how']}{by}")
     taken = f", {result.resumed} taken over from an interrupted bake" if result.resumed else ""
-    typer.echo(f"{result.path}: {_span(result.frames)} in {result.seconds:.1f} s{taken}")
+    say(f"{result.path}: {_span(result.frames)} in {result.seconds:.1f} s{taken}")
 
 
 def _span(codes: list[float]) -> str:

@@ -116,10 +116,19 @@ def _as_typed(function, name: str) -> str:
     return max(words, key=len, default=f"--{name.replace('_', '-')}")
 
 
+def say(text) -> None:
+    """Print a result to stdout, without what would steer a terminal: names come from files."""
+    typer.echo("\n".join(map(_harmless, str(text).split("\n"))))
+
+
 def one_line(text) -> None:
-    """Print to stderr, without line breaks, without what would steer a terminal, and not without end: names come from files."""
-    line = "".join(each if each.isprintable() else "?" for each in " ".join(str(text).split()))
+    """Print to stderr, without line breaks, without what would steer a terminal, and not without end."""
+    line = _harmless(" ".join(str(text).split()))
     print(line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}...", file=sys.stderr)
+
+
+def _harmless(line: str) -> str:
+    return "".join(each if each.isprintable() else "?" for each in line)
 
 
 def note(notes) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from .command import command_of, counted, note, print_json
+from .command import command_of, counted, note, print_json, say
 from .options import (
     AsJson,
     Cuts,
@@ -111,12 +111,12 @@ def train(
     if as_json:
         print_json({"model": str(out), "training": model.training, "report": model.report})
     else:
-        typer.echo(
+        say(
             f"{out}: {counted(len(model.chains), 'hair joint')} in {counted(len(model.chains.roots), 'chain')}, "
             f"{model.training['steps']} steps"
         )
         for line in report_lines(model.report):
-            typer.echo(line)
+            say(line)
 
 
 @command("bake")
@@ -172,7 +172,7 @@ def bake(
     else:
         rig, *others = result.rigs
         also = f", and {counted(len(others), 'more character')}" if others else ""
-        typer.echo(
+        say(
             f"{result.path}: {counted(rig.joints, 'hair joint')}, {counted(rig.samples, 'sample')}, in {rig.animation}{also}"
         )
 
@@ -197,9 +197,9 @@ def evaluate(
         print_json({"path": str(card.path), "skeleton": card.skeleton, **card.measures, "notes": card.notes})
         return
     joints, roots = counted(card.measures["joints"], "hair joint"), counted(card.measures["chains"], "chain")
-    typer.echo(f"{card.skeleton}: {joints} in {roots}")
+    say(f"{card.skeleton}: {joints} in {roots}")
     for line in card.lines():
-        typer.echo(line)
+        say(line)
     note(card.notes)
 
 
@@ -215,7 +215,7 @@ def export_c(
     from neuralocks_core.rig.network import RigModel
 
     path = write(RigModel.load(model), out, prefix)
-    typer.echo(f"{path} and {example_beside(path)}")
+    say(f"{path} and {example_beside(path)}")
 
 
 @command("inspect")
@@ -237,7 +237,7 @@ def inspect(
     if as_json:
         print_json({"skeleton": hair.source.path, "chains": rows, "notes": notes})
         return
-    typer.echo(f"{hair.source.path}: {counted(len(hair.rig.chains), 'hair joint')} in {counted(len(rows), 'chain')}")
+    say(f"{hair.source.path}: {counted(len(hair.rig.chains), 'hair joint')} in {counted(len(rows), 'chain')}")
     for row in rows:
-        typer.echo(f"  {row['name']}: {counted(row['joints'], 'joint')}, {100 * row['length']:.1f} cm")
+        say(f"  {row['name']}: {counted(row['joints'], 'joint')}, {100 * row['length']:.1f} cm")
     note(notes)

@@ -9,7 +9,7 @@ import typer
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.shortcomings import HELD, HELD_BEGUN, KEPT
 
-from .command import note, noting_when_cut_short, print_json
+from .command import note, noting_when_cut_short, print_json, say
 from .options import AsJson, Head, Joints, Out, Seed, Skeleton, numbers, pairs
 
 SEVERAL = ("--groom", "--motion", "--set")
@@ -106,8 +106,8 @@ def train_command(
     if as_json:
         print_json({"model": str(path), "training": meta["training"], "report": meta["report"]})
         return
-    typer.echo(f"{path}: {meta['training']['steps']:,} steps in {meta['training']['minutes']:g} min")
-    typer.echo(_reached(meta["report"], all(meta["training"].get(KEPT, []))))
+    say(f"{path}: {meta['training']['steps']:,} steps in {meta['training']['minutes']:g} min")
+    say(_reached(meta["report"], all(meta["training"].get(KEPT, []))))
 
 
 def _reached(report: dict, strands_too: bool) -> str:

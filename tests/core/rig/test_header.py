@@ -13,7 +13,7 @@ from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import RigSampler, find_chains, rig_spec
-from neuralocks_core.rig.export_c import export_c
+from neuralocks_core.rig.export_c import example_beside, export_c
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_quaternion, from_vector, to_quaternion
 from tests.core.rig.builders import character, model_of, random_features, random_model, tail
@@ -113,10 +113,10 @@ def test_what_no_header_computes_is_refused(tmp_path):
 
 
 @pytest.mark.skipif(not shutil.which("cc"), reason="no cc here")
-@pytest.mark.parametrize("name", ["braid", "long hair (1)"])
+@pytest.mark.parametrize("name", ["braid.h", "long hair (1).h", "braid.hpp"])
 def test_the_example_is_built_by_the_line_that_it_gives(tmp_path, name):
-    export_c(random_model(), tmp_path / f"{name}.h")
-    command = re.search(r"cc -std=c99 .*", (tmp_path / f"{name}_example.c").read_text())[0]
+    export_c(random_model(), tmp_path / name)
+    command = re.search(r"(cc -std=c99|c\+\+ -std=c\+\+11) .*", example_beside(tmp_path / name).read_text())[0]
     done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0 and "turns by" in done.stdout, done.stderr
 

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from neuralocks_core import model as model_file
-from usd.cli.command import one_line
+from usd.cli.command import one_line, say
 
 from ..commands import status
 from ..shots import write_shot
@@ -30,6 +30,16 @@ def test_what_names_from_files_hold_does_not_reach_the_terminal(capsys):
     assert capsys.readouterr().err == "error: joint '?[31mred?' is missing: \u00e9\n"
     one_line("a" * 10_000_000)
     assert len(capsys.readouterr().err) < 20_000
+    say("joints\n  \x1b[31mred\x07: \u00e9")
+    assert capsys.readouterr().out == "joints\n  ?[31mred?: \u00e9\n"
+
+
+def test_results_show_what_files_say_without_what_steers_a_terminal(tmp_path, model, capsys):
+    told = model_file.read(model)
+    forged = model_file.write(tmp_path / "forged.neuralocks", {**told.meta, "credits": ["by \x1b[2Jme"]}, told.graphs)
+    assert status("inspect", forged) == 0
+    out = capsys.readouterr().out
+    assert "by ?[2Jme" in out and "\x1b" not in out
 
 
 def test_names_that_are_no_text_are_refused_in_one_line(tmp_path, model, capsys):
