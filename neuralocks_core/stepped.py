@@ -45,7 +45,10 @@ class Stepped:
             clip: without cuts.
             joints: those whose motion the hair reads.
         """
-        ends, count = _held(clip.times, _changes(clip.joints, joints))
+        whole, bent = _changes(clip.joints, joints)
+        ends, count = _held(clip.times, whole)
+        if not len(count):  # a vehicle, or a root that is animated on ones, may carry a body on twos
+            ends, count = _held(clip.times, bent)
         if not len(count):
             return cls(clip, count, clip, clip.times)
         shown = np.arange(len(clip.times))  # per sample, the one whose pose it holds
@@ -65,17 +68,26 @@ class Stepped:
         return np.interp(base, self._whole.times, self._first) + (times - base)
 
 
-def _changes(joints: np.ndarray, read: list[int]) -> np.ndarray:
-    """How much the joints that are read change from each sample to the next (T - 1,), in units of what rounding may cause."""
-    changes = []
-    for part in (slice(3), slice(3, 4)):  # far from the origin places are rounded more, but turns are not
-        change, size = np.zeros(len(joints) - 1), 2.0
-        for joint in sorted(set(read)):
-            own = joints[:, joint, :3, part]
-            np.maximum(change, np.abs(np.diff(own, axis=0)).max(axis=(1, 2)), out=change)
-            size = max(size, np.abs(own).max())
-        changes.append(change / (ROUNDING * size))
-    return np.maximum(*changes)
+def _changes(joints: np.ndarray, read: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """How much the joints that are read change from each sample to the next (T - 1,), in units of what rounding may cause: in the
+    world, and as seen from the second of them, the chest.
+    """
+    own = joints[:, list(dict.fromkeys(read)), :3]
+    chest = joints[:, read[min(1, len(read) - 1)], :3]
+    turns, places = own[..., :3], own[..., 3]
+    back = chest[:, None, :, :3].swapaxes(-1, -2)  # a transpose: whatever the scale, it is the same for the same pose
+    seen = back @ turns, (back @ (places - chest[:, None, :, 3])[..., None])[..., 0]
+    sizes = [max(2.0, np.abs(each).max(initial=0)) for each in (turns, places)]
+    found = []
+    for parts in ((turns, places), seen):
+        change = np.zeros(len(joints) - 1)
+        for part, size in zip(
+            parts, sizes, strict=True
+        ):  # far from the origin places are rounded more, but turns are not
+            moved = np.abs(np.diff(part, axis=0)).max(axis=tuple(range(1, part.ndim)), initial=0)
+            np.maximum(change, moved / (ROUNDING * size), out=change)
+        found.append(change)
+    return found[0], found[1]
 
 
 def _held(times: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -64,6 +64,20 @@ def test_between_frames_the_motion_goes_from_pose_to_pose_as_they_are_drawn():
     )
 
 
+def test_a_body_on_twos_may_ride_on_what_moves_on_ones():
+    """A vehicle, or a root with a key a frame, drives on and turns: the hair holds with the pose."""
+    first = FRAMES - FRAMES % 2
+    ride = np.tile(np.eye(4), (len(FRAMES), 1, 1))
+    ride[:, :3, :3] = rotation.from_vector(np.outer(0.01 * FRAMES, [0, 1, 0]))
+    ride[:, 2, 3] = 0.05 * FRAMES
+    clip = shown(first, speed=0.0)
+    ridden = replace(clip, joints=ride[:, None] @ clip.joints)
+    assert not len(Stepped.of(replace(ridden, joints=ride[:, None] @ walk(FRAMES / 24).joints), [HEAD, 1]).held)
+    history = vectors(ridden, FRAMES)[:, BoundarySpec().slices["history"]]
+    np.testing.assert_array_equal(history[1::2], history[::2])
+    assert np.abs(np.diff(history[::2], axis=0)).max(axis=1).min() > 1e-3
+
+
 def test_poses_may_be_held_for_a_part_of_the_clip_and_for_one_frame_or_three():
     """On ones, then on twos and threes, with a pose that shows for one frame."""
     frames = [*range(12), 12, 12, 14, 14, 16, 16, 16, 19, 19, 21, 22, 22, 24, 24, *range(26, 40)]

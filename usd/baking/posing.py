@@ -2,7 +2,6 @@
 """Points of grooms at any time code: a pure function of the shot and the model."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -47,7 +46,7 @@ class GroomPoser:
         character, self._rig = attachment.character, attachment.rig
         self._material = (material or Material()).log_ratios()
         self._strength, self._wind = strength, wind
-        self._sampler = model.sampler(character, replace(self._rig.clip, loop=True) if loop else self._rig.clip)
+        self._sampler = model.sampler(character, self._rig.cycle if loop else self._rig.clip)
         self._resolvers: list[tuple[slice | np.ndarray, Resolver]] = []
         with preparing():  # or 150 MB of a large groom would stay allocated
             self._placers = [GroomPlacer(item) for item in items]

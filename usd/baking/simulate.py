@@ -3,7 +3,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -101,7 +101,7 @@ class _SimulatedPoser:
         if not len(chosen):
             raise NeuralocksError(f"{item.path}: no strand has two distinct points; there is nothing to simulate")
         codes = Stencils(item, codes, first, blown=wind is not None).codes
-        clip = replace(self._rig.clip, loop=loop)
+        clip = self._rig.cycle if loop else self._rig.clip
         seconds = self._rig.border.seconds(codes)
         # Simulation begins with the animation, whatever frames are wanted; before it, hair is at rest. A loop has no beginning, so
         # its wanted frames come after a run-in. A wind has none, either: hair moves in it before the animation.

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is measured of one groom of a bake, and of the same strands simulated."""
 
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -198,7 +197,8 @@ class Subject:
     @cached_property
     def _clip(self) -> Clip:
         """The motion; a loop if the bake records that it was one."""
-        return replace(self.item.attachment.rig.clip, loop=bool(recorded(self.item.prim).get("loop")))
+        rig = self.item.attachment.rig
+        return rig.cycle if recorded(self.item.prim).get("loop") else rig.clip
 
     @property
     def _cuts(self) -> np.ndarray:

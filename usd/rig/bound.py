@@ -91,7 +91,7 @@ class BoundHair:
             NeuralocksError: the head is held as it was bound, so that no hair would move.
         """
         source, chains = self.hair.source, self.model.chains
-        clip = replace(source.clip, loop=True) if loop else source.clip
+        clip = source.cycle if loop else source.clip
         carried = CarriedHair(self.model, self.joints, source.character, clip)
         turns = np.empty((len(self.codes), len(chains), 4))
         for row, code in enumerate(self.codes):

@@ -25,14 +25,15 @@ frame or two wider than its samples: a character that stood before them would st
 
 
 def clip_codes(source: JointSource, border: Border) -> np.ndarray:
-    """Ascending time codes (T,): the animation's samples, every frame in gaps wider than CLOSE, and the ends of a shot where
-    the character stands before or after its samples. If these are too many to hold, one for every frame, with a note.
+    """Ascending time codes (T,): the samples of the body's animation, those of a face or a parent and every frame in gaps wider than
+    CLOSE, and the ends of a shot where the character stands before or after its samples. If these are too many to hold, one for
+    every frame, with a note.
 
     Raises:
         NeuralocksError: there are too many.
     """
     frame = border.frame
-    samples = source.samples
+    samples = source.keys.read((CLOSE + 1e-9) * border.rate, (STAND - 1e-9) * border.rate)
     if not samples:
         return np.zeros(1)
     first, last = samples[0], samples[-1]

@@ -17,6 +17,7 @@ from neuralocks_core.rotation import from_quaternion, relative_to_parents
 from ..border.arrays import wxyz
 from ..border.placement import Placement
 from ..border.values import as_names, as_numbers
+from .keys import Keys
 from .rig_copy import hair_of, source_of
 
 STRETCH = 0.003
@@ -70,22 +71,19 @@ class JointSource:
         self._columns = self._animated_joints()
 
     @cached_property
-    def samples(self) -> list[float]:
-        """Ascending time codes with an authored sample: the animation's and the moving parents'. Keys on what does not change are
-        not motion: if they begin before it, the character would stand there, and hair would start with a blow.
-        """
-        channels = [(self.placement.samples, self.placement.at)]
+    def keys(self) -> Keys:
+        """When the animation, and the parents if they move, have samples."""
+        joints, face = [], []
         if self._animation is not None:
-            posing = self._channels() if self._columns is not None else ()
-            every = (*posing, self._animation.GetBlendShapeWeightsAttr())
-            channels += [(attribute.GetTimeSamples(), attribute.Get) for attribute in every]
-        moving, still = set(), set()
-        for times, at in channels:
-            first = at(times[0]) if times else None
-            moves = any(not np.array_equal(first, at(time)) for time in times[1:])
-            (moving if moves else still).update(times)
-        last = max(moving, default=-np.inf)
-        return sorted(moving | {time for time in still if time > last})
+            joints = self._channels() if self._columns is not None else ()
+            face = [self._animation.GetBlendShapeWeightsAttr()]
+        joints, face = ([(each.GetTimeSamples(), each.Get) for each in own] for own in (joints, face))
+        return Keys.of(joints, [(self.placement.samples, self.placement.at)], face)
+
+    @property
+    def samples(self) -> list[float]:
+        """All of these time codes, ascending."""
+        return self.keys.every
 
     @property
     def animated(self) -> bool:

@@ -2,7 +2,7 @@
 """One skeleton of a stage, as read."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -91,12 +91,12 @@ class StageRig:
             codes: ascending time codes that were asked for.
             replaced: joints that a bake replaces; how these move does not matter.
         """
-        ends = self.clip.joints[[0, -1], :, :3, :3]
+        ends = self.cycle.joints[[0, -1], :, :3, :3]
         turn = np.degrees(angle_between(*polar(ends)[0]))
         turn[flat(ends).any(axis=0)] = 0  # what is scaled to zero has no turn
         for joint in replaced:  # and what hangs from it
             turn[self.character.skeleton.below(joint)] = 0
-        start, end = self.time_codes[[0, -1]]
+        start, end = self.time_codes[self._repeated][[0, -1]]
         notes = []
         if len(self.time_codes) < 2:
             return [f"{self.path}: has no animation, whose length a loop would have; gusts do not repeat"]
@@ -144,6 +144,20 @@ class StageRig:
         # Where a time code is a second, frames are its parts.
         digits = 3 + max(0, math.ceil(-math.log10(self.border.frame)))
         return ",".join(f"{round(code, digits):.15g}" for code in codes[:most]) + (", ..." if len(codes) > most else "")
+
+    @cached_property
+    def cycle(self) -> Clip:
+        """The clip as a loop of the body's samples: a face that goes on longer, or a shot's range, is no part of it."""
+        rows, clip = self._repeated, self.clip
+        return replace(
+            clip, times=clip.times[rows], joints=clip.joints[rows], shape=clip.shape[rows], loop=True, cuts=()
+        )
+
+    @cached_property
+    def _repeated(self) -> slice:
+        """Samples of the clip that are in a loop."""
+        body = self.source.keys.body or self.time_codes
+        return slice(*np.searchsorted(self.time_codes, [body[0] - 1e-9, body[-1] + 1e-9]))
 
     @cached_property
     def carried(self) -> dict[int, Character]:

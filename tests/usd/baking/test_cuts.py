@@ -164,6 +164,26 @@ def test_a_loop_has_no_cuts(shots, tmp_path, model):
     assert not len(read_baked(loops[0]).shot.rigs[0].clip.cuts)
 
 
+@pytest.mark.parametrize("longer", ["range", "face"])
+def test_a_loop_is_as_long_as_the_cycle_of_the_joints(tmp_path, model, longer):
+    """Not as the shot's range, or as a face that goes on."""
+    path = write_loop(tmp_path)
+    plain = samples(bake(path, tmp_path / "plain.usdc", model, loop=True, frames="1:13").path, "points", at=13)
+    stage = Usd.Stage.Open(str(path))
+    if longer == "range":
+        stage.SetEndTimeCode(20)
+    else:
+        animation = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+        animation.CreateBlendShapesAttr(["smile"])
+        for code in range(1, 17):
+            animation.CreateBlendShapeWeightsAttr().Set([code % 2], code)
+    stage.Save()
+    done = bake(path, tmp_path / "longer.usdc", model, loop=True)
+    assert (samples(done.path, "points", at=13) == plain).all()
+    outside = "/Hero/Rig: its animation goes from 1 to 13; outside that range the hair goes on"
+    assert any(note.startswith(outside) for note in done.notes) == (longer == "range")
+
+
 def test_the_reference_starts_anew_too(bakes):
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
     from neuralocks_core.evaluation.comparison import simulated

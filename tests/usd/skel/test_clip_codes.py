@@ -101,6 +101,56 @@ def test_keys_of_what_stands_still_are_no_motion(tmp_path):
     assert read()[0].time_codes[-1] == 30
 
 
+def with_a_face(path, codes):
+    """The shot with a face weight at these time codes."""
+    stage = Usd.Stage.Open(str(path))
+    animation = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation))
+    animation.CreateBlendShapesAttr(["smile"])
+    for code in codes:
+        animation.CreateBlendShapeWeightsAttr().Set([0.5 + 0.5 * float(np.sin(code))], float(code))
+    stage.GetRootLayer().Export(str(path.with_name("face.usda")))
+    return path.with_name("face.usda")
+
+
+def test_finer_keys_of_a_face_or_a_parent_are_no_poses_of_the_body(tmp_path):
+    """In between, the body has no keys: a cut would be two fast steps, and each chord a motion of its own."""
+    path = write_shot(tmp_path, Recipe(frames=40))
+    stage = Usd.Stage.Open(str(path))
+    animation = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation))
+    places = animation.GetTranslationsAttr()
+    for code in range(20, 41):
+        there = np.array(places.Get(code))
+        there[0, 0] += 1
+        places.Set(there, code)
+    stage.Save()
+    plain = read_shot(path).rigs[0]
+    assert [plain.time_codes[1 + i] for i in plain.clip.times.searchsorted(plain.clip.cuts) - 1] == [20]
+    for codes in (np.arange(1, 40.1, 0.5), np.arange(0, 41, 0.4)):
+        rig = read_shot(with_a_face(path, codes)).rigs[0]
+        np.testing.assert_array_equal(rig.time_codes[rig.time_codes <= 40], plain.time_codes)
+        np.testing.assert_array_equal(rig.clip.cuts, plain.clip.cuts)
+    animation.GetBlendShapeWeightsAttr().Clear()
+    drift = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddTranslateOp()
+    for code in np.arange(1, 40.1, 0.25):
+        drift.Set((0.002 * code, 0, 0), code)
+    stage.Save()
+    np.testing.assert_array_equal(read_shot(path).rigs[0].time_codes, plain.time_codes)
+
+
+def test_keys_of_a_face_count_where_the_body_has_none(tmp_path):
+    path = write_shot(tmp_path, Recipe(frames=9))
+    codes = read_shot(with_a_face(path, [-10.5, 0.5, 4.5, 30.5])).rigs[0].time_codes
+    assert codes[0] == -10.5 and codes[-1] == 30.5 and not {0.5, 4.5} & set(codes)
+    stage = Usd.Stage.Open(str(path))
+    animation = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation))
+    for attribute in (animation.GetTranslationsAttr(), animation.GetRotationsAttr(), animation.GetScalesAttr()):
+        value = attribute.Get(1.0)
+        attribute.Clear()
+        attribute.Set(value)
+    stage.Save()
+    assert {4.5, 5.25} <= set(read_shot(with_a_face(path, [4.5, 5.25])).rigs[0].time_codes)
+
+
 def stepped(folder, samples, step=13.0, end=40):
     """A shot in which the head turns about +Y in no time at `step`, sampled at these time codes."""
     path = write_shot(folder, Recipe(frames=40), name=f"{len(samples)}")
