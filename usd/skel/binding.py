@@ -23,6 +23,11 @@ def bound_skeleton(prim: Usd.Prim) -> str | None:
     skeleton = UsdSkel.BindingAPI(prim).GetInheritedSkeleton()
     if skeleton:
         return str(skeleton.GetPath())
+    if former := prim.GetRelationship(FORMER):
+        # Unlike the targets of single specs below, its own are where references and inherits take them.
+        targets = (prim.GetStage().GetPrimAtPath(path) for path in former.GetTargets())
+        if skeleton := next(filter(None, map(UsdSkel.Skeleton, targets)), None):
+            return str(skeleton.GetPath())
     relation = prim.GetRelationship("skel:skeleton")
     specs = relation.GetPropertyStack() if relation else []
     for target in (target for spec in specs for target in spec.targetPathList.GetAddedOrExplicitItems()):
@@ -31,9 +36,6 @@ def bound_skeleton(prim: Usd.Prim) -> str | None:
     # A layer that unbinds and moves the points is a bake; the binding that it ended may be of a prim above.
     if any(spec.layer.GetNumTimeSamplesForPath(spec.path.ReplaceName("points")) for spec in specs):
         skeleton = UsdSkel.BindingAPI(prim.GetParent()).GetInheritedSkeleton()
-    if not skeleton and (former := prim.GetRelationship(FORMER)):
-        targets = (prim.GetStage().GetPrimAtPath(path) for path in former.GetTargets())
-        skeleton = next(filter(None, map(UsdSkel.Skeleton, targets)), None)
     return str(skeleton.GetPath()) if skeleton else None
 
 

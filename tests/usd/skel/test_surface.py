@@ -80,6 +80,28 @@ def test_a_bake_that_is_flattened_or_referenced_still_tells_the_binding_of_its_h
     np.testing.assert_allclose(item.groom.points, before.groom.points, atol=1e-6)
 
 
+@pytest.mark.parametrize("way", ["references", "inherits"])
+def test_baked_hair_that_is_used_twice_is_on_each_character(tmp_path, still_model, way):
+    """The skeleton that a bake unbound it from is that of the same copy, also where the first copy is on the stage as well."""
+    made = bake(write_shot(tmp_path), tmp_path / "hair.usdc", still_model, frames="1:3").path
+    stage = Usd.Stage.CreateNew(str(tmp_path / "crowd.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    if way == "inherits":
+        stage.CreateClassPrim("/Hero").GetReferences().AddReference(str(made), "/Hero")
+    for name, x in (("Hero" if way == "references" else "First", 0), ("Second", 3)):
+        prim = stage.DefinePrim(f"/{name}")
+        if way == "references":
+            prim.GetReferences().AddReference(str(made), "/Hero")
+        else:
+            prim.GetInherits().AddInherit("/Hero")
+        UsdGeom.Xformable(prim).AddTranslateOp().Set((x, 0, 0))
+    stage.Save()
+    grooms = read_baked(tmp_path / "crowd.usda").shot.grooms
+    assert [each.attachment.rig.path.split("/")[1] for each in grooms] == [each.path.split("/")[1] for each in grooms]
+    np.testing.assert_allclose(grooms[1].groom.points, grooms[0].groom.points, atol=1e-6)
+
+
 def test_a_character_that_comes_into_sight_has_its_body_before(tmp_path):
     path = write_shot(tmp_path)
     stage = Usd.Stage.Open(str(path))
