@@ -10,6 +10,7 @@ from neuralocks_core.progress import Progress, silent
 from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
+from ..shot.also_changed import also_changed
 from ..shot.notes import asked_notes, out_of_place
 from ..shot.stage import Shot, check_frames_named, read_shot
 from .samples import write_samples
@@ -55,6 +56,7 @@ def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[
         *asked_notes(shot.stage, shot.rigs, codes, loop),
         *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
         *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
+        *also_changed(shot.stage, (item.prim for item in shot.grooms)),
     ]
 
 

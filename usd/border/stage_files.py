@@ -95,13 +95,19 @@ def check_layer_name(out: Path) -> None:
 
 
 def check_not_input(out: Path, stage: Usd.Stage) -> None:
-    """Refuse to write over a file that the stage is composed of.
+    """Refuse to write over a file that the stage is composed of, or may be: of another variant, or of what is not loaded.
 
     Raises:
         NeuralocksError: `out` is one of them, under any name.
     """
     if any(one_file(out, path) for path in used_files(stage)):
         raise NeuralocksError(f"{out}: is read as well, as a file or a layer of it; choose another name")
+    for layer in stage.GetUsedLayers():
+        for asset in layer.GetCompositionAssetDependencies():
+            if one_file(out, layer.ComputeAbsolutePath(asset)):
+                raise NeuralocksError(
+                    f"{out}: {layer.GetDisplayName()} refers to it, as a layer or in a variant or payload; choose another name"
+                )
 
 
 def check_not_over(out: Path, stage: Usd.Stage) -> None:

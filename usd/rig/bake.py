@@ -19,6 +19,7 @@ from ..border.damage import names_damage
 from ..border.stage_files import check_layer_name, check_not_over
 from ..border.stopping import check
 from ..border.time_codes import given_cuts
+from ..shot.also_changed import also_changed
 from ..shot.notes import asked_notes, left_out, out_of_place, without_strength
 from ..shot.stage import check_cuts
 from ..shot.wind import as_wind, in_core, wind_facts
@@ -136,6 +137,7 @@ def bake_rig(
     facts = {"strength": float(strength), "loop": loop, **wind_facts(blown)}
     animations = write_rig_layer(written, shot, out, facts)
     late = [text for text in dict.fromkeys([*map(left_out, still), *said]) if text not in notes]
+    late += also_changed(stage, (one.hair.source.source.prim for one in written))
     late += out_of_place(stage, out)
     if tell:
         tell(late)

@@ -85,7 +85,8 @@ def moment(prim: Usd.Prim) -> float | None:
 def left_as_they_are(prim: Usd.Prim) -> list[str]:
     """The notes on values that belong to the points at rest, which a bake does not carry along."""
     notes = []
-    if UsdGeom.BasisCurves(prim).GetNormalsAttr().HasAuthoredValue():
+    normals = UsdGeom.BasisCurves(prim).GetNormalsAttr(), prim.GetAttribute("primvars:normals")
+    if any(each.HasAuthoredValue() for each in normals if each):
         notes.append(
             f"{prim.GetPath()}: has normals, which stay as they are at rest while the hair turns; "
             "remove them, so that it is drawn as tubes or facing the camera"

@@ -22,7 +22,7 @@ from .cut_samples import cut_samples
 from .joints import JointSource
 from .rig_copy import alike, hair_of, source_of
 from .stage_rig import StageRig, joint_trim
-from .surface import Skins, bound_meshes, find_skins, merged_body, moved_joints, not_posed
+from .surface import Skins, bound_meshes, find_skins, merged_body, moved_joints, not_posed, seen_in_turn
 
 COMPARED = 100
 """About this many poses of a rig bake are compared with those that it was made from."""
@@ -65,7 +65,7 @@ def read_rig(
     notes += _old_copy(source, time_codes)
     posed = source.posed(time_codes)
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
-    notes += not_posed(meshes, source)
+    notes += not_posed(meshes, source) + seen_in_turn(meshes)
     by_hand = joints_by_hand(head, joints)
     try:
         humanoid = _humanoid(source, by_hand, moved_joints(meshes, len(source.names)))

@@ -117,9 +117,34 @@ def drawn(prim: Usd.Prim) -> bool:
 
 def ever_visible(prim: Usd.Prim) -> bool:
     """Whether the prim is seen at any time: a character that comes into the shot has its body before, too."""
-    switches = [UsdGeom.Imageable(above).GetVisibilityAttr() for above in lineage(prim) if above.IsA(UsdGeom.Imageable)]
-    times = {code for switch in switches for code in switch.GetTimeSamples()} or {Usd.TimeCode.EarliestTime()}
-    return any(all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches) for time in times)
+    switches = _switches(prim)
+    return any(_seen(switches, time) for time in _switched(switches) or {Usd.TimeCode.EarliestTime()})
+
+
+def seen_in_turn(meshes: list[StageMesh]) -> list[str]:
+    """The note on meshes that are hidden at times at which others of the same skeleton are seen, such as one hat of two."""
+    switches = [_switches(mesh.prim) for mesh in meshes]
+    times = sorted(set().union(*map(_switched, switches)))
+    seen = np.array([[_seen(own, time) for time in times] for own in switches], bool).reshape(len(meshes), len(times))
+    partly = [mesh.prim for mesh, own in zip(meshes, seen) if (seen.any(axis=0) & ~own).any()]
+    if not partly:
+        return []
+    return [
+        f"{_first(partly)}: hidden at times, but hair is kept out of it in all frames; deactivate it if hair need not keep clear of it"
+    ]
+
+
+def _switches(prim: Usd.Prim) -> list[Usd.Attribute]:
+    """The visibility of a prim and of those above it."""
+    return [UsdGeom.Imageable(above).GetVisibilityAttr() for above in lineage(prim) if above.IsA(UsdGeom.Imageable)]
+
+
+def _switched(switches: list[Usd.Attribute]) -> set[float]:
+    return {code for switch in switches for code in switch.GetTimeSamples()}
+
+
+def _seen(switches: list[Usd.Attribute], time) -> bool:
+    return all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches)
 
 
 def merged_body(meshes: list[StageMesh], to_bind: np.ndarray, keep: set[str] | None = None) -> Body | None:

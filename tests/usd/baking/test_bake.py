@@ -253,6 +253,23 @@ def test_a_bake_over_its_own_shot_is_refused(tmp_path, model):
     assert os.listdir(tmp_path) == ["shot.usda"]
 
 
+def test_a_file_of_another_variant_of_the_shot_is_not_written_over(tmp_path, still_model):
+    base, other = (write_shot(tmp_path, name=name) for name in ("base", "longhair"))
+    stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
+    variants = stage.DefinePrim("/Hero", "SkelRoot").GetVariantSets().AddVariantSet("look")
+    for path in (other, base):
+        variants.AddVariant(path.stem)
+        variants.SetVariantSelection(path.stem)
+        with variants.GetVariantEditContext():
+            stage.GetPrimAtPath("/Hero").GetReferences().AddReference(f"./{path.name}", "/Hero")
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    stage.Save()
+    before = other.read_bytes()
+    with pytest.raises(NeuralocksError, match="longhair.usda: shot.usda refers to it, as a layer or in a variant"):
+        bake(tmp_path / "shot.usda", other, still_model, frames=[1])
+    assert other.read_bytes() == before
+
+
 def test_what_lies_over_a_shot_is_not_written_under_the_name_of_a_missing_layer_of_it(tmp_path, model):
     """Each would lie over the other: USD opens such files with an error, and the next bake would be of part of its own shot."""
     part = bake(write_shot(tmp_path, name="anim"), tmp_path / "part.usdc", model, frames=[2]).path

@@ -215,9 +215,10 @@ def test_a_hair_file_without_colors_gets_none(tmp_path):
     assert not curves.GetDisplayColorAttr().HasAuthoredValue() and not curves.GetDisplayOpacityAttr().HasAuthoredValue()
 
 
-def test_normals_are_said_to_stay_behind():
+@pytest.mark.parametrize("name", ["normals", "primvars:normals"])
+def test_normals_are_said_to_stay_behind(name):
     stage = Usd.Stage.CreateInMemory()
     curves = UsdGeom.BasisCurves.Define(stage, "/Ribbons")
     assert left_as_they_are(curves.GetPrim()) == []
-    curves.CreateNormalsAttr([(0, 0, 1)])
+    curves.GetPrim().CreateAttribute(name, Sdf.ValueTypeNames.Normal3fArray).Set([(0, 0, 1)])
     assert left_as_they_are(curves.GetPrim())[0].startswith("/Ribbons: has normals")

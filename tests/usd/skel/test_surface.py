@@ -102,6 +102,23 @@ def test_baked_hair_that_is_used_twice_is_on_each_character(tmp_path, still_mode
     np.testing.assert_allclose(grooms[1].groom.points, grooms[0].groom.points, atol=1e-6)
 
 
+def test_a_mesh_that_is_hidden_while_others_are_seen_is_told(tmp_path):
+    """A hat that is put on, but not a character that comes into the shot."""
+    path = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(path))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Skin", stage.GetRootLayer(), "/Hero/Hat")
+    told = [note for note in read_rigs(path)[0].notes if "hidden at times" in note]
+    for name in ("/Hero", "/Hero/Hat"):
+        switch = UsdGeom.Imageable(stage.GetPrimAtPath(name)).CreateVisibilityAttr()
+        switch.Set("invisible", 1)
+        switch.Set("inherited", 5 if name == "/Hero" else 7)
+        stage.Save()
+        told.append([note for note in read_rigs(path)[0].notes if "hidden at times" in note])
+    assert told[0] == [] and told[1][0].startswith(
+        "/Hero/Hat: hidden at times, but hair is kept out of it in all frames"
+    )
+
+
 def test_a_character_that_comes_into_sight_has_its_body_before(tmp_path):
     path = write_shot(tmp_path)
     stage = Usd.Stage.Open(str(path))
