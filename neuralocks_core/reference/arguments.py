@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of the simulators' arguments: a wrong shape or number is reported before anything is computed."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.materials import Material
+from neuralocks_core.materials import RANGES, Material
+from neuralocks_core.number_arrays import number_array
+
+_KNOWN = ", ".join(RANGES)
 
 
 def check_settings(dt: float, margin: float, gravity: float, **counts: int) -> None:
@@ -33,20 +37,28 @@ def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:
         strands: S.
 
     Raises:
-        NeuralocksError: a number is invalid, or a shape is wrong.
+        NeuralocksError: a number is invalid, a shape is wrong, a mapping has another name, or an object none of these.
     """
+    defaults = asdict(Material())
+    if material is None:
+        given = {}
+    elif isinstance(material, Mapping):
+        given = material
+    else:
+        given = {name: getattr(material, name) for name in defaults if hasattr(material, name)}
+        if not given:
+            raise NeuralocksError(f"material {material!r}: is not one; give a Material, or a dict of {_KNOWN}")
+    for name in given:
+        if name not in defaults:
+            raise NeuralocksError(f"material {name!r}: unknown name; the known ones are {_KNOWN}")
     found = {}
-    for name, default in asdict(Material()).items():
-        if material is None:
-            value = default
-        elif isinstance(material, dict):
-            value = material.get(name, default)
-        else:
-            value = getattr(material, name, default)
-        value = np.asarray(value, np.float64)
-        if value.shape not in ((), (1,), (strands,)) or not np.isfinite(value).all() or (value < 0).any():
-            raise NeuralocksError(f"material {name}: give a number of at least 0, or one for each of {strands} strands")
-        found[name] = np.broadcast_to(value, (strands,)).copy()
+    for name, default in defaults.items():
+        value, wanted = given.get(name, default), f"a number of at least 0, or one for each of {strands} strands"
+        numbers = number_array(f"material {name}", value, wanted)
+        known = np.asarray(value).dtype.kind != "b" and numbers.shape in ((), (1,), (strands,))
+        if not known or not np.isfinite(numbers).all() or (numbers < 0).any():
+            raise NeuralocksError(f"material {name}: give {wanted}")
+        found[name] = np.broadcast_to(numbers, (strands,)).copy()
     return found
 
 

@@ -173,6 +173,23 @@ def test_simulators_refuse_the_same_settings(simulator, change):
         simulator(groom(4), np.eye(4)[None], **change)
 
 
+@pytest.mark.parametrize("simulator", [simulate, simulate_xpbd])
+@pytest.mark.parametrize(
+    "material, word",
+    [
+        ({"stiffness": 5e-3}, "material 'stiffness': unknown name; the known ones are bend, weight, damping, clumping"),
+        ({"Bend": 5e-3}, "material 'Bend': unknown name"),
+        ([5e-3, 2, 20, 0], "is not one; give a Material, or a dict of bend, weight"),
+        ("bend=5e-3", "is not one; give a Material"),
+        ({"bend": "5e-3"}, "material bend: is not an array of numbers"),
+        ({"bend": True}, "material bend: give a number of at least 0"),
+    ],
+)
+def test_simulators_refuse_a_material_that_they_would_not_read(simulator, material, word):
+    with pytest.raises(NeuralocksError, match=word):
+        simulator(groom(4), np.eye(4)[None], material=material)
+
+
 def test_hair_without_gravity_stays_as_it_rests():
     for simulator in (simulate, simulate_xpbd):
         points = simulator(groom(4), np.tile(np.eye(4), (4, 1, 1)), gravity=0.0).points
