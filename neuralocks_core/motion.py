@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.flags import flag
 from neuralocks_core.number_arrays import number_array
 from neuralocks_core.rotation import from_vector, polar, to_vector
 
@@ -50,6 +51,7 @@ class Clip:
             given = getattr(self, name)
             if name != "shape" or given is not None:
                 object.__setattr__(self, name, number_array(f"animation's {name}", given, wanted))
+        object.__setattr__(self, "loop", flag("animation's loop", self.loop))
         if self.times.ndim != 1:
             raise NeuralocksError(f"animation: its times are of shape {self.times.shape}; give (T,) seconds")
         count = len(self.times)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.flags import flag
 from neuralocks_core.materials import COLLISION, MARGIN
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
@@ -102,7 +103,7 @@ def simulate(
     Raises:
         NeuralocksError: unsuitable shapes, values or device; the message names the argument.
     """
-    rods = rest_rods(rest, rest_support=rest_support)
+    planes, rods = flag("planes", planes), rest_rods(rest, rest_support=rest_support)
     strands, vertices = rods.mass.shape
     check_settings(dt, margin, gravity, substeps=substeps, iterations=iterations)
     for name, value in (("volume", volume), ("collision", collision), ("tolerance", tolerance)):

@@ -105,6 +105,13 @@ def test_what_is_no_array_of_numbers_is_named(change):
         Clip(**given)
 
 
+@pytest.mark.parametrize("loop", ["no", None, 1])
+def test_a_loop_is_one_or_not(loop):
+    assert not Clip([0.0, 1.0], np.tile(bind(), (2, 1, 1, 1)), loop=np.False_).period
+    with pytest.raises(NeuralocksError, match=f"animation's loop '?{loop}'?: must be True or False"):
+        Clip([0.0, 1.0], np.tile(bind(), (2, 1, 1, 1)), loop=loop)
+
+
 def test_times_are_one_row():
     with pytest.raises(NeuralocksError, match=r"animation: its times are of shape \(\); give \(T,\) seconds"):
         Clip(0.0, bind()[None])

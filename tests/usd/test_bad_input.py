@@ -9,12 +9,17 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import cannot_write
+from usd.assets.grow import grow
 from usd.assets.importing import import_groom
 from usd.baking.bake import bake
 from usd.baking.join import join
 from usd.baking.spool import Spool
+from usd.models.train import train
+from usd.review.demo import demo
+from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.review.picture import preview
+from usd.rig.train import train_rig
 from usd.shot.stage import read_shot
 
 from .shots import HAIR, SKIN, Recipe, edited, write_shot
@@ -60,6 +65,10 @@ WRONG = {
     "word as strength": ({"strength": "1"}, "--strength '1': must be a number from 0 to 4"),
     "no strength": ({"strength": float("nan")}, "--strength nan: must be"),
     "truth as jobs": ({"jobs": True}, "--jobs True: must be a whole number"),
+    "word as resolve": ({"resolve": "false"}, "--resolve 'false': must be True or False"),
+    "word as loop": ({"loop": "no"}, "--loop 'no': must be True or False"),
+    "number as velocities": ({"velocities": 0}, "--velocities 0: must be True or False"),
+    "no velocities": ({"velocities": None}, "--velocities None: must be True or False"),
     "list as joints": ({"joints": ["a"]}, "joints: .*'a'.* is not a dict"),
 }
 
@@ -71,6 +80,35 @@ def test_a_wrong_argument_is_named(tmp_path, model, case):
     with pytest.raises(NeuralocksError, match=text.replace("(", ".")):
         bake(write_shot(tmp_path, recipe), tmp_path / "out.usdc", **{"model": model, **arguments})
     assert [p.name for p in tmp_path.iterdir()] == ["shot.usda"]
+
+
+@pytest.mark.parametrize(
+    ("name", "work"),
+    [
+        ("--reference", lambda flag: evaluate("shot.usda", flag)),
+        ("--turntable", lambda flag: preview("shot.usda", "out.png", turntable=flag)),
+        ("--clip", lambda flag: demo("out", clip=flag)),
+        ("--with-character", lambda flag: grow("bob", "shot.usda", "out.usda", with_character=flag)),
+        ("--with-character", lambda flag: import_groom("hair.tfx", "out.usda", with_character=flag)),
+        ("--paper", lambda flag: train("shot.usda", [], [], "out.neuralocks", {}, paper=flag)),
+        ("--resume", lambda flag: train("shot.usda", [], [], "out.neuralocks", {}, resume=flag)),
+        ("--keep-work", lambda flag: train("shot.usda", [], [], "out.neuralocks", {}, keep_work=flag)),
+        ("dynamic", lambda flag: train_rig("shot.usda", "out.neuralocks", dynamic=flag)),
+        ("early", lambda flag: train_rig("shot.usda", "out.neuralocks", early=flag)),
+    ],
+)
+def test_a_word_is_neither_true_nor_false(tmp_path, monkeypatch, name, work):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(NeuralocksError, match=f"{name} 'false': must be True or False"):
+        work("false")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_flag_may_be_numpys(tmp_path, model):
+    shot = write_shot(tmp_path)
+    for resolve in (False, np.False_):
+        bake(shot, tmp_path / f"{type(resolve).__name__}.usda", model, frames="1", resolve=resolve)
+    assert (tmp_path / "bool.usda").read_text() == (tmp_path / f"{type(np.False_).__name__}.usda").read_text()
 
 
 @pytest.mark.parametrize("content", [b"", b"PXR-USDC" + bytes(80), b"#usda 1.0\ndef (", b"PK\x03\x04junk"])

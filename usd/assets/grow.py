@@ -13,6 +13,7 @@ from neuralocks_core.body.head_field import head_field
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
+from neuralocks_core.flags import flag
 from neuralocks_core.groom import LARGEST_COORDINATE, Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, check_style, from_head
 from neuralocks_core.hairstyles import grow as grow_style
@@ -62,7 +63,7 @@ def grow(
     Raises:
         NeuralocksError: an unknown style, no head with skin, or a file that cannot be written.
     """
-    out = as_path(out, "out")
+    out, with_character = as_path(out, "out"), flag("--with-character", with_character)
     check_layer_name(out)
     check_style(style, count, variation)
     rigs = read_rigs(character, skeleton, head)

@@ -10,6 +10,7 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 from neuralocks_core.deformation.freeing import freed
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.files import as_path
+from neuralocks_core.flags import flag
 from neuralocks_core.formats.look import Look
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
@@ -68,6 +69,7 @@ def import_groom(
     """
     sources = [as_path(each, "source") for each in (source if isinstance(source, list | tuple) else [source])]
     out, rig, over, notes, found = as_path(out, "out"), None, None, [], []
+    with_character = flag("--with-character", with_character)
     for option, value in (("with-character", with_character), ("skeleton", skeleton), ("head", head)):
         if value and character is None:
             raise NeuralocksError(f"--{option}: there is no character; name one with --character")

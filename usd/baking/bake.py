@@ -9,6 +9,7 @@ from dataclasses import asdict, replace
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
+from neuralocks_core.flags import flag
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import StrandModel, cores
@@ -79,6 +80,7 @@ def bake(
     began = time.monotonic()
     out = as_path(out, "out")
     check_layer_name(out)
+    resolve, loop, velocities = flag("--resolve", resolve), flag("--loop", loop), flag("--velocities", velocities)
     jobs = _jobs(jobs)
     movers = Movers(model, jobs)
     look = as_material(material)

@@ -14,6 +14,7 @@ from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.comparison import BLOWN, RUN_IN, simulated
 from neuralocks_core.files import as_path
+from neuralocks_core.flags import flag
 from neuralocks_core.progress import Progress
 
 from ..border.amounts import check_number
@@ -72,6 +73,7 @@ def simulate(
     count = STRANDS if strands is None else strands
     check_number("--strands", count, 1, whole=True)
     check_number("--volume", volume, 0, STIFFEST_VOLUME)
+    loop = flag("--loop", loop)
     blown = as_wind(wind, gusts)
     cuts = given_cuts(cuts, loop)
     shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)

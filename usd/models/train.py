@@ -14,6 +14,7 @@ from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.deformation.suited import nearest_to_all
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
+from neuralocks_core.flags import flag
 from neuralocks_core.number_words import plain_number
 from neuralocks_core.progress import Progress
 
@@ -76,6 +77,7 @@ def train(
     """
     if method not in METHODS:
         raise NeuralocksError(f"--method {method}: is unknown; choose one of {', '.join(METHODS)}")
+    paper, resume, keep_work = flag("--paper", paper), flag("--resume", resume), flag("--keep-work", keep_work)
     if paper and method != "selfsupervised":
         raise NeuralocksError("--paper: goes with --method selfsupervised only; add it, or leave --paper out")
     check_training()

@@ -9,6 +9,7 @@ from pathlib import Path
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
 from neuralocks_core.files import as_path, atomic_write
+from neuralocks_core.flags import flag
 from neuralocks_core.progress import Progress
 
 from ..baking.bake import bake
@@ -64,7 +65,7 @@ def demo(out, model=None, *, clip: bool = True, progress: Progress | None = None
     Raises:
         NeuralocksError: something is missing or cannot be written. A missing preview library is only noted.
     """
-    out = as_path(out, "out")
+    out, clip = as_path(out, "out"), flag("--clip", clip)
     shot, seconds, notes = shipped_shot(), {}, []
     outputs = {"bake": out / "demo.usdc"}
 

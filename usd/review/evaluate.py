@@ -6,6 +6,7 @@ import numpy as np
 from neuralocks_core import metrics
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
+from neuralocks_core.flags import flag
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress, silent
 
@@ -45,6 +46,7 @@ def evaluate(
     Raises:
         NeuralocksError: the file is not a bake, or the reference is not installed.
     """
+    reference = flag("--reference", reference)
     beside = _models_beside(model) if reference else None  # before minutes of work
     if not isinstance(baked, Baked):
         baked = read_baked(baked, grooms, skeleton, head, joints)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.flags import flag
 from neuralocks_core.preview import pictures as drawing
 from neuralocks_core.preview.film import AZIMUTH
 from neuralocks_core.progress import Progress
@@ -62,6 +63,7 @@ def preview(
     for side in size or ():
         check_number("--size", side, *SIDES, whole=True)
     check_number("--view", view, -360, 360)
+    turntable = flag("--turntable", turntable)
     if isinstance(baked, Baked):
         scene, border = _strands(baked, tell)
     else:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
+from neuralocks_core.flags import flag
 from neuralocks_core.progress import Progress
 from neuralocks_core.rig.network import RigModel
 from neuralocks_core.shortcomings import shortcomings
@@ -105,6 +106,7 @@ def bake_rig(
     out, shot = as_path(out, "out"), as_path(shot, "shot")
     check_layer_name(out)
     check_number("--strength", strength, 0, 2)
+    loop = flag("--loop", loop)
     model = model if isinstance(model, RigModel) else RigModel.load(model)
     blown = as_wind(wind, gusts)
     check_felt(blown is None or model.feels_wind)

@@ -7,6 +7,7 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
+from neuralocks_core.flags import flag
 from neuralocks_core.progress import Progress
 from neuralocks_core.shortcomings import shortcomings
 
@@ -63,7 +64,7 @@ def train_rig(
         NeuralocksError: the rig or the model to begin with cannot be used, a number is out of its range, or the extra `train` is
             missing.
     """
-    material = material or {}
+    material, dynamic, early = material or {}, flag("dynamic", dynamic), flag("early", early)
     _check_amounts(dynamic, seconds, steps, hidden, clips, seed, material)
     check_training()
     from neuralocks_core.rig.rods import RigMaterial

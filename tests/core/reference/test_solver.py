@@ -155,6 +155,8 @@ def test_substeps_follow_the_same_motion():
         ({"start": np.full((4, 24, 3), np.nan)}, "start: holds NaN"),
         ({"tolerance": -1e-3}, "tolerance -0.001"),
         ({"collision": np.inf}, "collision inf"),
+        ({"planes": "no"}, "planes 'no': must be True or False"),
+        ({"rest_support": None}, "rest_support None: must be True or False"),
     ],
 )
 def test_errors_name_the_argument(change, word):

@@ -58,6 +58,7 @@ def test_what_would_take_for_ever_or_means_nothing_is_refused(tmp_path):
         ({"volume": 1e308}, "--volume 1e\\+308: must be a number from 0 to 100"),
         ({"strands": 0}, "--strands 0: must be a whole number from 1 on"),
         ({"strands": "40"}, "--strands '40': must be"),
+        ({"loop": "false"}, "--loop 'false': must be True or False"),
         ({"joints": {"nose": "head"}}, "--joint nose=...: there is no such meaning"),
     ):
         with pytest.raises(NeuralocksError, match=said):

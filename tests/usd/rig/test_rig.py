@@ -166,6 +166,7 @@ def test_hair_starts_anew_after_a_cut(tmp_path):
         ({"cuts": [99]}, "--cuts 99: lies outside"),
         ({"strength": None}, "--strength None: must be a number from 0 to 2"),
         ({"cuts": [13], "loop": True}, "leave out --loop"),
+        ({"loop": "no"}, "--loop 'no': must be True or False"),
     ):
         with pytest.raises(NeuralocksError, match=words):
             bake_rig(shot, tmp_path / "bad.usda", model, **options)
