@@ -19,7 +19,7 @@ DEEP = 0.003
 LIVELY = 0.005
 """A strand moves if the rms of its motion is more than this share of its length."""
 SETTLED = 0.1
-"""Hair has settled when its tips stay below this share of their largest speed."""
+"""Hair has settled when its tips stay below this share of their largest speed, or below STILL if that is more."""
 HELD = 1e-5
 """Transforms that change by less than this in HELD_TIME [s] belong to a held pose."""
 HELD_TIME = 1 / 24
@@ -158,7 +158,8 @@ def swings(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> tup
 
 
 def settling_time(points: np.ndarray, times: np.ndarray, stop: float) -> float:
-    """Time [s] after `stop` until the mean tip speed stays below SETTLED of its largest value after the stop.
+    """Time [s] after `stop` until the mean tip speed stays below SETTLED of its largest value after the stop, or below STILL if that
+    is more.
 
     Tips that never exceed the speed STILL have settled at once; for tips that never settle, it is the time left.
     """

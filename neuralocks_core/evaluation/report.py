@@ -27,7 +27,7 @@ LABELS = {
     "droop_cm": ("droop", "cm", "tips below the rigid groom's, mean"),
     "speed_cm_s": ("speed relative to the head", "cm/s", "mean; rigid hair has 0"),
     "swing_percent": ("swing of the tips", "%", "of strand length (of a coil's line), rms"),
-    "settling_s": ("settling after a stop", "s", "until 10 % of the tip speed"),
+    "settling_s": ("settling after a stop", "s", "until 10 % of the tips' peak speed, or 1 cm/s"),
     "jitter_mm": ("jitter in a held pose", "mm", "largest step of a vertex, 2 s after the stop"),
     "turn_degrees": ("turn from edge to edge", "deg", "mean; much above that at rest is crinkled"),
     "turn_at_rest_degrees": ("the same at rest", "deg", ""),

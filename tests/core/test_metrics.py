@@ -128,7 +128,8 @@ def test_what_stops_at_once_has_settled_at_its_last_moving_sample():
 
 
 def test_what_creeps_on_slower_than_still_has_settled():
-    """Even if that is more than a tenth of a slow motion."""
+    """Even if that is more than a tenth of a slow motion; the card says so."""
+    assert f"or {100 * metrics.STILL:g} cm/s" in LABELS["settling_s"][2]
     points = np.zeros((len(TIMES), 1, 24, 3))
     points[:, 0, :, 0] = np.where(TIMES < 0.5, 0.05 * TIMES, 0.025 + 0.008 * (TIMES - 0.5))[:, None]
     assert metrics.settling_time(points, TIMES, stop=0.0) == 0.5
