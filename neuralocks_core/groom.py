@@ -24,7 +24,7 @@ class Groom:
     topology. Strands with fewer than two distinct points stay in the groom; `strands.strand_set.StrandSet.valid` keeps
     them out of the network.
 
-    Arrays are converted to the stated types and made read-only.
+    Arrays are converted to the stated types and made read-only: copied, unless nobody can write to them already.
 
     Raises:
         NeuralocksError: a shape does not fit, a value is not finite, a width is negative, or there is no strand.
@@ -52,9 +52,7 @@ class Groom:
         self._check_values("points", self.points, LARGEST_COORDINATE, "m")
 
         strands, total = len(self.counts), len(self.points)
-        widths = (
-            np.full(1, WIDTH, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
-        )
+        widths = _own(WIDTH, np.float32) if self.widths is None else self._array("widths", self.widths, np.float32)
         if widths.ndim != 1 or len(widths) not in {1, strands, total}:
             raise self._error(
                 f"widths have shape {widths.shape}", f"give 1, {strands} (one a strand) or {total} (one a point)"
@@ -134,8 +132,6 @@ class Groom:
         return replace(self, points=self.points[kept], counts=counts, widths=widths, **pick)
 
     def _put(self, field: str, value: np.ndarray) -> None:
-        value = value.view()
-        value.flags.writeable = False
         object.__setattr__(self, field, value)
 
     def _shaped(self, field: str, value: np.ndarray, *each: int) -> np.ndarray:
@@ -151,7 +147,7 @@ class Groom:
     def _array(self, field: str, value: object, kind: type) -> np.ndarray:
         try:
             with np.errstate(over="ignore"):
-                return np.ascontiguousarray(value, dtype=kind)
+                return _own(value, kind)
         except (TypeError, ValueError):
             raise self._error(f"{field} is not a plain array of numbers", "give one") from None
 
@@ -165,7 +161,7 @@ class Groom:
         # Compared in Python: a uint64 would wrap around silently on conversion.
         if value.size and not -(2**31) <= int(value.min()) <= int(value.max()) < 2**31:
             raise self._error(f"{field} do not fit 32 bits", "repair the groom")
-        return np.ascontiguousarray(value, dtype=np.int32)
+        return _own(value, np.int32)
 
     def _check_values(self, field: str, value: np.ndarray, largest: float, unit: str) -> None:
         """Check that values are finite and of plausible size; the message says where the first bad value is."""
@@ -183,3 +179,18 @@ class Groom:
                 "check the unit",
             )
         raise self._error(f"{len(rows)} of {len(value)} {field} are not finite, first {where}", "repair the groom")
+
+
+def _own(value: object, kind: type) -> np.ndarray:
+    """The value as a contiguous array of a kind that nobody can write to; itself, if it is one."""
+    if not (type(value) is np.ndarray and value.dtype == kind and value.flags.c_contiguous and _fixed(value)):
+        value = np.array(value, kind, order="C", ndmin=1)
+        value.flags.writeable = False
+    return value
+
+
+def _fixed(array: np.ndarray) -> bool:
+    """Whether nobody can write to an array: it is read-only, and what it is a view of, too."""
+    while isinstance(array, np.ndarray) and not array.flags.writeable:
+        array = array.base
+    return array is None

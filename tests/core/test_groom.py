@@ -20,6 +20,25 @@ def test_types_and_defaults():
         groom.points[0] = 0
 
 
+def test_a_groom_stays_as_it_is_when_its_arrays_are_used_again():
+    points, counts, guides = POINTS.astype(np.float32), np.array([3, 2], np.int32), np.zeros(2, bool)
+    widths = np.ones(5, np.float32)
+    behind = points.view()
+    behind.flags.writeable = False
+    grooms = [Groom("/hair", each, counts, widths, guides=guides, group=counts) for each in (points, behind)]
+    points[:], counts[:], guides[:], widths[:] = 9, 1, True, 5
+    for groom in grooms:
+        np.testing.assert_array_equal(groom.points, POINTS.astype(np.float32))
+        np.testing.assert_array_equal([groom.counts, groom.group], [[3, 2]] * 2)
+        assert not groom.guides.any() and (groom.widths == 1).all()
+
+
+def test_what_nobody_can_write_to_is_not_copied():
+    groom = Groom("/hair", POINTS, [3, 2])
+    part = Groom("/part", groom.points[3:], groom.counts[1:])
+    assert np.shares_memory(part.points, groom.points) and np.shares_memory(part.counts, groom.counts)
+
+
 def test_subset_takes_everything_along():
     groom = Groom(
         "/hair",
