@@ -65,7 +65,7 @@ class Groom:
             self._put("root_uv", self._shaped("root_uv", self._array("root_uv", self.root_uv, np.float32), 2))
             self._check_values("root_uv", self.root_uv, np.inf, "")
         if self.guides is not None:
-            self._put("guides", self._shaped("guides", self._array("guides", self.guides, np.bool_)))
+            self._put("guides", self._shaped("guides", self._truths("guides", self.guides)))
         if self.group is not None:
             self._put("group", self._shaped("group", self._whole_numbers("group", self.group)))
 
@@ -115,8 +115,17 @@ class Groom:
 
         Args:
             strands: (N,) int indices or (S,) bool mask.
+
+        Raises:
+            NeuralocksError: it is neither of these, or leaves no strand.
         """
-        chosen = np.arange(self.strand_count)[np.asarray(strands)]
+        count, strands = self.strand_count, _plain(strands)
+        try:
+            chosen = np.arange(count)[strands]
+        except IndexError:
+            chosen = None
+        if chosen is None or strands.ndim != 1:
+            raise self._error("a subset is not of its strands", f"give indices below {count}, or a mask ({count},)")
         counts = self.counts[chosen]
         # Index of each kept point: its strand's start, plus its place within the strand.
         within = np.arange(counts.sum(dtype=np.int64)) - np.repeat(np.cumsum(counts, dtype=np.int64) - counts, counts)
@@ -145,23 +154,26 @@ class Groom:
         return NeuralocksError(f"{self.name}: {fact}; {remedy}")
 
     def _array(self, field: str, value: object, kind: type) -> np.ndarray:
-        try:
-            with np.errstate(over="ignore"):
-                return _own(value, kind)
-        except (TypeError, ValueError):
-            raise self._error(f"{field} is not a plain array of numbers", "give one") from None
+        value = _plain(value)
+        if value.dtype.kind not in "biuf":
+            raise self._error(f"{field} is not a plain array of numbers", "give one")
+        with np.errstate(over="ignore"):
+            return _own(value, kind)
 
     def _whole_numbers(self, field: str, value: object) -> np.ndarray:
-        try:
-            value = np.asarray(value)
-        except ValueError:
-            value = np.asarray(None)
+        value = _plain(value)
         if value.size and value.dtype.kind not in "iub":
             raise self._error(f"{field} are not whole numbers", "give integers")
         # Compared in Python: a uint64 would wrap around silently on conversion.
         if value.size and not -(2**31) <= int(value.min()) <= int(value.max()) < 2**31:
             raise self._error(f"{field} do not fit 32 bits", "repair the groom")
         return _own(value, np.int32)
+
+    def _truths(self, field: str, value: object) -> np.ndarray:
+        value = _plain(value)
+        if value.dtype.kind not in "biuf" or not np.isin(value, (0, 1)).all():
+            raise self._error(f"{field} are neither true nor false", "give booleans")
+        return _own(value, np.bool_)
 
     def _check_values(self, field: str, value: np.ndarray, largest: float, unit: str) -> None:
         """Check that values are finite and of plausible size; the message says where the first bad value is."""
@@ -179,6 +191,14 @@ class Groom:
                 "check the unit",
             )
         raise self._error(f"{len(rows)} of {len(value)} {field} are not finite, first {where}", "repair the groom")
+
+
+def _plain(value: object) -> np.ndarray:
+    """The value as an array of whatever type; of objects if it is none."""
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        return np.asarray(None)
 
 
 def _own(value: object, kind: type) -> np.ndarray:

@@ -84,8 +84,23 @@ def test_subset_takes_everything_along():
         ({"root_uv": np.zeros((5, 2))}, "root_uv has shape"),
         ({"root_uv": np.full((2, 2), np.inf)}, "root_uv are not finite"),
         ({"group": [1]}, "group has shape"),
+        ({"points": POINTS.astype(str)}, "points is not a plain array"),
+        ({"points": POINTS + 1j}, "points is not a plain array"),
+        ({"widths": "0.1"}, "widths is not a plain array"),
+        ({"guides": ["False", "no"]}, "guides are neither true nor false"),
+        ({"guides": [np.nan, 1]}, "guides are neither true nor false"),
     ],
 )
 def test_bad_input_names_the_groom(changes, fact):
     with pytest.raises(NeuralocksError, match=f"^/hair: .*{fact}.*; "):
         Groom(**{"name": "/hair", "points": POINTS, "counts": [3, 2], **changes})
+
+
+@pytest.mark.parametrize("strands", [[2], [0.0], [True], [], ["0"], [[0]], 0, [[0], [1, 0]]])
+def test_a_subset_of_strands_that_it_lacks_names_the_groom(strands):
+    groom = Groom("/hair", POINTS, [3, 2], guides=[0, 1])
+    np.testing.assert_array_equal(groom.subset([-1]).guides, [True])
+    with pytest.raises(
+        NeuralocksError, match=r"^/hair: a subset is not of its strands; give indices below 2, or a mask \(2,\)"
+    ):
+        groom.subset(strands)
