@@ -68,15 +68,20 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
 
     Returns:
         `penetration_percent`, `penetration_3mm_percent`: share of vertices inside, and deeper than 3 mm;
-        `penetration_worst_mm`; `inside_at_rest_percent`: how many vertices the author put inside.
+        `penetration_worst_mm`; `inside_at_rest_percent`: how many vertices the author put inside. NaN if a distance is.
     """
     depth = np.maximum(np.minimum(rest_distance, 0) - distance, 0.0)
+    worst = float(np.max(depth, initial=0.0))
+
+    def share(inside: np.ndarray) -> float:
+        return float("nan") if np.isnan(worst) else 100 * _mean(inside)  # NaN compares false, as if outside
+
     # The spacing of float32 coordinates 20 m from the origin: rounding is not penetration.
     return {
-        "penetration_percent": 100 * _mean(depth > 2e-6),
-        "penetration_3mm_percent": 100 * _mean(depth > DEEP),
-        "penetration_worst_mm": 1000 * float(np.max(depth, initial=0.0)),
-        "inside_at_rest_percent": 100 * _mean(np.asarray(rest_distance) < 0),
+        "penetration_percent": share(depth > 2e-6),
+        "penetration_3mm_percent": share(depth > DEEP),
+        "penetration_worst_mm": 1000 * worst,
+        "inside_at_rest_percent": share(np.asarray(rest_distance) < 0),
     }
 
 
@@ -135,7 +140,7 @@ def motion_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) 
 
     Returns:
         `median` over strands, and `p95`, which one strand in twenty exceeds; `rms`: the same ratio over all strands
-        together, dominated by the few that came to rest elsewhere. NaN if nothing moves.
+        together, dominated by the few that came to rest elsewhere. NaN if nothing moves, or if hair or reference hold NaN.
     """
     error, true = swings(np.asarray(points, float), np.asarray(reference, float), length)
     if not len(true):
@@ -153,7 +158,7 @@ def swings(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> tup
     moves by more than LIVELY of its length (S,) [m].
     """
     error, true = _swing(points - reference), _swing(reference)
-    lively = true > LIVELY * length
+    lively = ~(true <= LIVELY * length)  # with those that are NaN: where they are left out, nobody would know
     return error[lively], true[lively]
 
 
@@ -161,14 +166,17 @@ def settling_time(points: np.ndarray, times: np.ndarray, stop: float) -> float:
     """Time [s] after `stop` until the mean tip speed stays below SETTLED of its largest value after the stop, or below STILL if that
     is more.
 
-    Tips that never exceed the speed STILL have settled at once; for tips that never settle, it is the time left.
+    Tips that never exceed the speed STILL have settled at once; for tips that never settle, it is the time left. NaN if points are.
     """
     tips = speed(points[:, :, -1:], times).mean(axis=(1, 2))
     middle = (times[1:] + times[:-1]) / 2
     after = middle >= stop
-    if not after.any() or tips[after].max() < STILL:
+    peak = tips[after].max(initial=0.0)
+    if peak < STILL:
         return 0.0
-    loud = np.flatnonzero(after & (tips > max(SETTLED * tips[after].max(), STILL)))
+    if np.isnan(peak):
+        return float("nan")
+    loud = np.flatnonzero(after & (tips > max(SETTLED * peak, STILL)))
     return float(times[loud[-1] + 1] - stop) if len(loud) else 0.0
 
 

@@ -179,6 +179,19 @@ def test_penetration_counts_only_what_is_deeper_than_at_rest():
     assert result["inside_at_rest_percent"] == pytest.approx(40)
 
 
+def test_what_is_unknown_is_not_fine():
+    """NaN in one strand or one frame."""
+    reference, _ = swinging(decay=3)
+    broken = reference.copy()
+    broken[3, 0] = np.nan
+    rest = np.array([0.01, -0.01])
+    for distance in ([[0.01, np.nan]], [[np.nan, np.nan]], [[0.01, 0.01], [np.nan, -0.1]]):
+        assert np.isnan(list(metrics.penetration(np.array(distance), rest).values())).all()
+    for pair in ((broken, reference), (reference, broken), (broken, broken)):
+        assert np.isnan(list(metrics.motion_error(*pair, LENGTH).values())).all()
+    assert np.isnan(metrics.settling_time(broken, TIMES, stop=0.0))
+
+
 def test_droop_is_measured_along_gravity_in_the_heads_axes():
     displacement = np.zeros((3, 2, 24, 3))
     displacement[:, :, -1] = [0.0, 0.0, 0.03]
