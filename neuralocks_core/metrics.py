@@ -3,10 +3,14 @@
 
 Hair comes as points (T, S, K, 3) [m] in canonical space, where hair that is carried rigidly stands still, so that
 all motion here is motion of the hair itself. `reference` is a trusted simulation of the same strands at the same
-times.
+times. What does not fit together, such as a reference of other frames, is a NeuralocksError: numpy would repeat it.
 """
 
 import numpy as np
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.metric_arguments import ascending, hair_of, reals, rows_of
+from neuralocks_core.number_arrays import number_array
 
 DYNAMIC_SHARE = 0.35
 """A frame counts as dynamic if hair moves at least at this share of the reference's speed (Neuroll, table 1)."""
@@ -48,6 +52,7 @@ def stretch(lengths: np.ndarray, rest: np.ndarray) -> dict[str, float]:
         `stretch_cm`, the mean of |L - L0| in cm (Neuroll's stretch violation); `stretch_percent` and
         `stretch_percent_max`, mean and largest |L - L0| / L0.
     """
+    lengths, rest = rows_of("lengths", lengths, "rest", rest)
     real = rest > 1e-6
     off = np.abs(np.asarray(lengths, float)[..., real] - rest[real])
     return {
@@ -70,6 +75,7 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
         `penetration_percent`, `penetration_3mm_percent`: share of vertices inside, and deeper than 3 mm;
         `penetration_worst_mm`; `inside_at_rest_percent`: how many vertices the author put inside. NaN if a distance is.
     """
+    distance, rest_distance = rows_of("distance", distance, "rest_distance", rest_distance)
     depth = np.maximum(np.minimum(rest_distance, 0) - distance, 0.0)
     worst = float(np.max(depth, initial=0.0))
 
@@ -81,7 +87,7 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
         "penetration_percent": share(depth > 2e-6),
         "penetration_3mm_percent": share(depth > DEEP),
         "penetration_worst_mm": 1000 * worst,
-        "inside_at_rest_percent": share(np.asarray(rest_distance) < 0),
+        "inside_at_rest_percent": share(rest_distance < 0),
     }
 
 
@@ -89,7 +95,9 @@ def speed(points: np.ndarray, times: np.ndarray, cuts: np.ndarray = ()) -> np.nd
     """Speed (T - 1, S, K) [m/s] of every vertex between consecutive times (T,) [s]. Where hair starts anew, at times `cuts` (C,), its
     jump is no motion: two times before and after one of them have no speed, and are left out.
     """
-    kept = np.flatnonzero(np.diff(np.searchsorted(np.asarray(cuts, float) - 1e-9, times, side="right")) == 0)
+    points, times = hair_of(times, points=points)
+    cuts = np.sort(number_array("cuts", cuts, "(C,) seconds")) - 1e-9
+    kept = np.flatnonzero(np.diff(np.searchsorted(cuts, times, side="right")) == 0)
     far = np.empty((len(kept), *points.shape[1:-1]), np.result_type(points, np.float32))
     for row, frame in enumerate(kept):  # all differences at once would be as large as all points
         far[row] = np.linalg.norm(points[frame + 1] - points[frame], axis=-1)
@@ -100,13 +108,15 @@ def velocity_error(points: np.ndarray, reference: np.ndarray, times: np.ndarray,
     """Mean length of the velocity's error over the mean length of the reference's velocity; 1 for rigid hair. NaN if the reference
     is MOTIONLESS.
     """
-    return _relative(speed(np.asarray(points, float) - reference, times, cuts), speed(reference, times, cuts))
+    points, reference = hair_of(points=points, reference=reference)
+    return _relative(speed(points.astype(float, copy=False) - reference, times, cuts), speed(reference, times, cuts))
 
 
 def motion_ratio(points: np.ndarray, reference: np.ndarray, times: np.ndarray, cuts: np.ndarray = ()) -> float:
     """Mean speed over the reference's mean speed: 0 for rigid hair, 1 for hair as lively as the reference, even if the motion is a
     different one. NaN if the reference is MOTIONLESS.
     """
+    points, reference = hair_of(points=points, reference=reference)
     return _relative(speed(points, times, cuts), speed(reference, times, cuts))
 
 
@@ -116,7 +126,8 @@ def dynamic_frames(points: np.ndarray, reference: np.ndarray, times: np.ndarray,
 
     Samples at which the reference stands still neither count nor break a run.
     """
-    own, true = (speed(each, times, cuts).mean(axis=(1, 2)) for each in (points, reference))
+    hair = hair_of(points=points, reference=reference)
+    own, true = (speed(each, times, cuts).mean(axis=(1, 2)) for each in hair)
     moving = true >= STILL
     best = run = 0
     for alive in own[moving] >= DYNAMIC_SHARE * true[moving]:
@@ -127,7 +138,8 @@ def dynamic_frames(points: np.ndarray, reference: np.ndarray, times: np.ndarray,
 
 def position_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> float:
     """Mean distance of a vertex from the reference's, in percent of its strand's length (S,) [m]."""
-    off = np.linalg.norm(np.asarray(points, float) - reference, axis=-1)
+    points, reference, length = hair_of(length=length, points=points, reference=reference)
+    off = np.linalg.norm(points.astype(float, copy=False) - reference, axis=-1)
     return 100 * _mean(off / np.maximum(length, 1e-6)[:, None])
 
 
@@ -142,7 +154,8 @@ def motion_error(points: np.ndarray, reference: np.ndarray, length: np.ndarray) 
         `median` over strands, and `p95`, which one strand in twenty exceeds; `rms`: the same ratio over all strands
         together, dominated by the few that came to rest elsewhere. NaN if nothing moves, or if hair or reference hold NaN.
     """
-    error, true = swings(np.asarray(points, float), np.asarray(reference, float), length)
+    points, reference = hair_of(points=points, reference=reference)
+    error, true = swings(points.astype(float, copy=False), reference.astype(float, copy=False), length)
     if not len(true):
         return dict.fromkeys(("median", "p95", "rms"), float("nan"))
     each = error / true
@@ -157,6 +170,7 @@ def swings(points: np.ndarray, reference: np.ndarray, length: np.ndarray) -> tup
     """The parts of `motion_error`: rms of the motion's error and of the reference's motion (n,) [m] of each strand that
     moves by more than LIVELY of its length (S,) [m].
     """
+    points, reference, length = hair_of(length=length, points=points, reference=reference)
     error, true = _swing(points - reference), _swing(reference)
     lively = ~(true <= LIVELY * length)  # with those that are NaN: where they are left out, nobody would know
     return error[lively], true[lively]
@@ -168,6 +182,7 @@ def settling_time(points: np.ndarray, times: np.ndarray, stop: float) -> float:
 
     Tips that never exceed the speed STILL have settled at once; for tips that never settle, it is the time left. NaN if points are.
     """
+    points, times = hair_of(times, points=points)
     tips = speed(points[:, :, -1:], times).mean(axis=(1, 2))
     middle = (times[1:] + times[:-1]) / 2
     after = middle >= stop
@@ -185,7 +200,8 @@ def echo(points: np.ndarray, reference: np.ndarray, times: np.ndarray, stop: flo
     tips after it: motion that returns when hair should come to rest. For `points - reference`, it is the share of that motion that
     is wrong.
     """
-    tips, true = (speed(p[:, :, -1:], times).mean(axis=(1, 2)) for p in (points, reference))
+    *hair, times = hair_of(times, points=points, reference=reference)
+    tips, true = (speed(p[:, :, -1:], times).mean(axis=(1, 2)) for p in hair)
     since = (times[1:] + times[:-1]) / 2 - stop
     later = (since >= 0.5) & (since < 2.0)
     peak = true[since >= 0].max(initial=0.0)
@@ -203,6 +219,9 @@ def turning(points: np.ndarray) -> float:
 
 def jitter(points: np.ndarray) -> float:
     """Largest distance [mm] that a vertex goes from one frame to the next in a held pose: 0 if nothing moves."""
+    points = reals("points", points, "(T, ..., 3) metres")
+    if points.ndim < 2 or points.shape[-1] != 3 or not len(points):
+        raise NeuralocksError(f"points: are of shape {points.shape}; give frames of hair, (T, ..., 3)")
     return 1000 * float(np.linalg.norm(np.diff(points, axis=0), axis=-1).max(initial=0.0))
 
 
@@ -213,12 +232,17 @@ def droop(displacement: np.ndarray, down: np.ndarray) -> float:
         displacement: (T, S, K, 3) [m] canonical.
         down: unit vectors of gravity in canonical axes, (T, 3).
     """
-    return 100 * _mean(np.einsum("tsi,ti->ts", np.asarray(displacement[:, :, -1], float), down))
+    (displacement,) = hair_of(displacement=displacement)
+    down = reals("down", down, "(T, 3) unit vectors")
+    if down.shape != (len(displacement), 3):
+        raise NeuralocksError(f"down: is of shape {down.shape}; give {(len(displacement), 3)}, one for each frame")
+    return 100 * _mean(np.einsum("tsi,ti->ts", displacement[:, :, -1].astype(float, copy=False), down))
 
 
 def tip_curves(displacement: np.ndarray) -> np.ndarray:
     """Mean displacement of the tips (T, 3) [m] in canonical space: the curve that a person compares."""
-    return np.asarray(displacement[:, :, -1], float).mean(axis=1)
+    (displacement,) = hair_of(displacement=displacement)
+    return displacement[:, :, -1].astype(float, copy=False).mean(axis=1)
 
 
 def held(joints: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -226,6 +250,7 @@ def held(joints: np.ndarray, times: np.ndarray) -> np.ndarray:
 
     Nor does any within HELD_TIME before or after, times (T,) [s]: with many samples per frame, each changes little in slow motion.
     """
+    times = ascending(times, len(joints))
     rows = np.arange(len(times))
     before = np.searchsorted(times, times - HELD_TIME + 1e-9, side="right") - 1
     after = np.searchsorted(times, times + HELD_TIME - 1e-9)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core import metrics
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.pose_energies import curvature, energies, stretch_energy
 from neuralocks_core.evaluation.report import LABELS
 from neuralocks_core.materials import Material
@@ -190,6 +191,51 @@ def test_what_is_unknown_is_not_fine():
     for pair in ((broken, reference), (reference, broken), (broken, broken)):
         assert np.isnan(list(metrics.motion_error(*pair, LENGTH).values())).all()
     assert np.isnan(metrics.settling_time(broken, TIMES, stop=0.0))
+
+
+REFERENCE, _ = swinging()
+DISTANCE, DOWN = np.ones((4, 5)), np.tile([0, -1.0, 0], (len(TIMES), 1))
+
+
+@pytest.mark.parametrize(
+    ("measure", "fact"),
+    [
+        (lambda hair: metrics.position_error(hair, hair[:1], LENGTH), r"reference: is of shape \(1, 2, 24, 3\); give"),
+        (lambda hair: metrics.motion_error(hair, hair[:1], LENGTH), "reference: is of shape"),
+        (lambda hair: metrics.velocity_error(hair, hair[:1], TIMES), "reference: is of shape"),
+        (lambda hair: metrics.motion_ratio(hair, hair[:, :1], TIMES), "reference: is of shape"),
+        (lambda hair: metrics.echo(hair, hair[:, :1], TIMES, 0.0), "reference: is of shape"),
+        (lambda hair: metrics.dynamic_frames(hair, hair[:, :1], TIMES), "reference: is of shape"),
+        (lambda hair: metrics.position_error(hair, hair, LENGTH[:1]), "length: give .* for each of 2 strands"),
+        (lambda hair: metrics.position_error(hair, hair, LENGTH * [1, 0]), "length: give .* above 0"),
+        (lambda hair: metrics.motion_error(hair, hair, -LENGTH), "length: give .* above 0"),
+        (lambda hair: metrics.position_error(hair[:0], hair[:0], LENGTH), "points: is of shape .0, 2, 24, 3.; give"),
+        (lambda hair: metrics.speed(hair[:, 0], TIMES), "points: is of shape"),
+        (lambda hair: metrics.speed(hair, TIMES[::-1]), "times: give ascending seconds"),
+        (lambda hair: metrics.settling_time(hair, TIMES[:-1], 0.0), "times: give ascending seconds"),
+        (lambda hair: metrics.held(np.zeros((80, 1, 4, 4)), TIMES[:80][::-1]), "times: give ascending seconds"),
+        (lambda hair: metrics.speed(hair, TIMES, "4"), "cuts: is not an array of numbers"),
+        (lambda hair: metrics.tip_curves(hair.astype(str)), "displacement: is not an array of numbers"),
+        (lambda hair: metrics.droop(hair, DOWN[:1]), "down: is of shape"),
+        (lambda hair: metrics.jitter(hair[:0]), "points: are of shape"),
+        (lambda hair: metrics.penetration(DISTANCE, DISTANCE[0, :1]), "distance: is of shape .4, 5., rest_distance of"),
+        (lambda hair: metrics.penetration(DISTANCE[:0], DISTANCE[0]), "distance: is of shape"),
+        (lambda hair: metrics.stretch(DISTANCE, DISTANCE[:, 0]), "lengths: is of shape .4, 5., rest of .4,."),
+    ],
+)
+def test_what_does_not_fit_together_is_refused(measure, fact):
+    with pytest.raises(NeuralocksError, match=f"^{fact}"):
+        measure(REFERENCE)
+
+
+def test_whole_numbers_do_not_wrap_around_and_cuts_may_come_in_any_order():
+    falling = np.zeros((3, 1, 2, 3), np.uint8)
+    falling[:, :, :, 1] = np.array([2, 1, 0])[:, None, None]
+    assert metrics.jitter(falling) == 1000
+    assert (metrics.speed(falling, [0, 1, 2]) == 1).all()
+    assert metrics.velocity_error(falling, falling + falling, [0, 1, 2]) == 0.5
+    cuts = [1.0, 2.0, 3.0]
+    assert np.array_equal(metrics.speed(REFERENCE, TIMES, cuts[::-1]), metrics.speed(REFERENCE, TIMES, cuts))
 
 
 def test_droop_is_measured_along_gravity_in_the_heads_axes():
