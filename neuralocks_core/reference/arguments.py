@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,12 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.number_arrays import number_array
+from neuralocks_core.reference.rest import RestRods
+
+CLAMPED_WITHIN = 1e-4
+"""A start's clamped vertices may be this far from those of rest [m]: files round."""
+LENGTH_WITHIN = 0.01
+"""Its edges may be longer or shorter than those of rest by this share: the first step gives them their lengths."""
 
 _KNOWN = ", ".join(RANGES)
 
@@ -18,15 +25,27 @@ def check_settings(dt: float, margin: float, gravity: float, **counts: int) -> N
     """What every simulator is told: `counts` are substeps and the like, the others as in `solver.simulate`.
 
     Raises:
-        NeuralocksError: a number is not finite or out of range.
+        NeuralocksError: a number is none, not finite, or out of range.
     """
     told = ", ".join(f"{name} {value}" for name, value in counts.items())
-    if not (np.isfinite(dt) and dt > 0) or min(counts.values()) < 1:
-        raise NeuralocksError(f"dt {dt}, {told}: must be positive")
-    if any(count % 1 for count in counts.values()) or not np.isfinite(margin):
-        raise NeuralocksError(f"{told}, margin {margin}: give whole steps, metres")
-    if not 0 <= gravity < np.inf:
+    if not (_from_zero(dt) and dt > 0) or not all(_from_zero(count) and count >= 1 for count in counts.values()):
+        raise NeuralocksError(f"dt {dt}, {told}: must be positive numbers")
+    if not all(isinstance(count, Integral) for count in counts.values()):
+        raise NeuralocksError(f"{told}: give whole steps")
+    if not _from_zero(gravity):
         raise NeuralocksError(f"gravity {gravity}: give 0 or more [m/s^2]; it pulls down, along -Y")
+    check_amounts(margin=margin)
+
+
+def check_amounts(**amounts: float) -> None:
+    """Settings that may be 0.
+
+    Raises:
+        NeuralocksError: one is no number, not finite, or below 0.
+    """
+    for name, value in amounts.items():
+        if not _from_zero(value):
+            raise NeuralocksError(f"{name} {value}: must be a number of 0 or above")
 
 
 def check_material(material: Any, strands: int) -> dict[str, np.ndarray]:
@@ -86,12 +105,40 @@ def check_body(body: Any, triangles: np.ndarray | None, frames: int) -> tuple[np
     """
     if len(body) != frames:
         raise NeuralocksError(f"body: {len(body)} frames for {frames} of the head; give one for each")
-    first, faces = np.asarray(body[0]), np.asarray(triangles)
+    first, faces = number_array("body", body[0], "points (T, V, 3) in metres"), np.asarray(triangles)
     if first.ndim != 2 or first.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
         raise NeuralocksError("body: give points (T, V, 3) and triangles (F, 3)")
+    if faces.dtype.kind not in "iu":
+        raise NeuralocksError(f"triangles: are of type {faces.dtype}; give whole numbers, the vertices of each")
     if faces.min() < 0 or faces.max() >= len(first):
         raise NeuralocksError(f"triangles: name vertices outside 0..{len(first) - 1}")
     return first, faces
+
+
+def check_start(start: np.ndarray | None, rods: RestRods) -> np.ndarray | None:
+    """(S, K, 3) float64 canonical points at the first frame [m], if any.
+
+    Raises:
+        NeuralocksError: wrong shape, not finite, not clamped where the rods are, or of other lengths.
+    """
+    if start is None:
+        return None
+    shape = rods.points.shape
+    start = number_array("start", start, f"{shape} metres")
+    if start.shape != shape:
+        raise NeuralocksError(f"start: shape {start.shape}; give {shape}, as rest")
+    if not np.isfinite(start).all():
+        raise NeuralocksError("start: holds NaN or infinity; give points in metres")
+    away = np.linalg.norm(start - rods.points, axis=-1)[:, :2].max()
+    if away > CLAMPED_WITHIN:
+        raise NeuralocksError(f"start: a root is {away:.3g} m from that of rest; give vertices 0 and 1 as in rest")
+    edge, length = np.linalg.norm(np.diff(start, axis=1), axis=-1), rods.length[:, 1:]
+    off = np.abs(edge / length - 1).max()
+    if off > LENGTH_WITHIN:
+        raise NeuralocksError(
+            f"start: an edge's length is off by {100 * off:.3g} %; give edges as long as those of rest"
+        )
+    return start
 
 
 def check_wind(wind: np.ndarray | None, frames: int) -> np.ndarray:
@@ -100,7 +147,12 @@ def check_wind(wind: np.ndarray | None, frames: int) -> np.ndarray:
     Raises:
         NeuralocksError: wrong shape, or not finite.
     """
-    wind = np.zeros((frames, 3)) if wind is None else np.asarray(wind, np.float64)
+    wind = np.zeros((frames, 3)) if wind is None else number_array("wind", wind, f"{(frames, 3)} m/s^2")
     if wind.shape != (frames, 3) or not np.isfinite(wind).all():
         raise NeuralocksError(f"wind: shape {wind.shape}; give finite accelerations {(frames, 3)}, one for each frame")
     return wind
+
+
+def _from_zero(value: Any) -> bool:
+    """Whether it is a finite number of 0 or above."""
+    return isinstance(value, Real) and not isinstance(value, bool) and 0 <= value < np.inf

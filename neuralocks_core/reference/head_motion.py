@@ -9,6 +9,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.number_arrays import number_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,7 @@ def head_motion(head: np.ndarray, substeps: int) -> HeadMotion:
     Raises:
         NeuralocksError: wrong shape, not finite, or not rigid.
     """
-    head = np.asarray(head, np.float64)
+    head = number_array("head", head, "(T, 4, 4)")
     if head.ndim != 3 or head.shape[1:] != (4, 4) or len(head) == 0:
         raise NeuralocksError(f"head: shape {head.shape}; give (frames, 4, 4)")
     if not np.isfinite(head).all():

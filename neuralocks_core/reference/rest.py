@@ -7,6 +7,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.flags import flag
+from neuralocks_core.number_arrays import number_array
 from neuralocks_core.strands.bends import bends
 from neuralocks_core.strands.rest_support import rest_force
 
@@ -39,7 +40,7 @@ def rest_rods(points: np.ndarray, *, rest_support: bool = True) -> RestRods:
         NeuralocksError: wrong shape, not finite, or an edge of zero length.
     """
     rest_support = flag("rest_support", rest_support)
-    points = np.asarray(points, np.float64)
+    points = number_array("rest", points, "(S, K, 3) metres")
     if points.ndim != 3 or points.shape[1] < 3 or points.shape[2] != 3:
         raise NeuralocksError(f"rest: shape {points.shape}; give (strands, vertices >= 3, 3)")
     if not np.isfinite(points).all():

@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.flags import flag
 from neuralocks_core.materials import COLLISION, MARGIN
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.arguments import (
+    check_amounts,
     check_body,
     check_material,
     check_neighbours,
     check_settings,
+    check_start,
     check_wind,
 )
 from neuralocks_core.reference.head_motion import HeadMotion, between, head_motion
@@ -88,8 +89,8 @@ def simulate(
         tolerance: a strand is solved when the rms net force is below this fraction of its weight.
         rest_support: bind pose is an equilibrium.
         neighbours: (S, N) int strands whose corresponding vertices are tied to this one's (clumping), -1 for none.
-        start: (S, K, 3) canonical points at the first frame; None: the equilibrium of the first pose, searched from
-            the rest shape.
+        start: (S, K, 3) canonical points at the first frame, clamped and as long as at rest; None: the equilibrium of the first
+            pose, searched from the rest shape.
         bind_body: (V, 3) canonical body in bind pose, for the distance at rest; None: taken from the first frame.
         margin: distance kept from the body [m], or a vertex's own distance at rest if that is less.
         collision: stiffness of the contact [1/(m s^2)].
@@ -106,9 +107,7 @@ def simulate(
     planes, rods = flag("planes", planes), rest_rods(rest, rest_support=rest_support)
     strands, vertices = rods.mass.shape
     check_settings(dt, margin, gravity, substeps=substeps, iterations=iterations)
-    for name, value in (("volume", volume), ("collision", collision), ("tolerance", tolerance)):
-        if not 0 <= value < np.inf:
-            raise NeuralocksError(f"{name} {value}: must be 0 or above")
+    check_amounts(volume=volume, collision=collision, tolerance=tolerance)
     way, frames = head_motion(head, substeps), len(head)
     # relative to the head's first position: far from the world's origin, rounding would dominate
     away = way.origin[0]
@@ -117,10 +116,7 @@ def simulate(
     result = _empty_rollout(frames, strands, vertices, planes)
     if strands == 0:
         return result
-    if start is not None and np.shape(start) != rods.points.shape:
-        raise NeuralocksError(f"start: shape {np.shape(start)}; give {rods.points.shape}, as rest")
-    if start is not None and not np.isfinite(start).all():
-        raise NeuralocksError("start: holds NaN or infinity; give points in metres")
+    start = check_start(start, rods)
     from neuralocks_core.reference.stepper import Stepper
 
     stepper = Stepper(
@@ -166,7 +162,7 @@ def _empty_rollout(frames: int, strands: int, vertices: int, planes: bool) -> Si
 
 def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, iterations: int) -> None:
     """Put hair at its start, by default in the equilibrium of the first pose, moving along with the head."""
-    stepper.begin(way.turn[0], way.origin[0], rods.points if start is None else np.asarray(start, np.float64))
+    stepper.begin(way.turn[0], way.origin[0], rods.points if start is None else start)
     if start is None:
         stepper.settle(SETTLE_DT, iterations)
     before = way.origin[0] - (way.origin[1] - way.origin[0]) if len(way.origin) > 1 else way.origin[0]

@@ -141,6 +141,11 @@ def test_substeps_follow_the_same_motion():
     assert np.abs(twice - more).mean() < 0.5 * np.abs(once - more).mean()
 
 
+def longer(rest):
+    """Rest points whose strands are a tenth longer from their second vertex on."""
+    return np.concatenate([rest[:, :2], rest[:, 1:2] + 1.1 * (rest[:, 2:] - rest[:, 1:2])], axis=1)
+
+
 @pytest.mark.parametrize(
     "change, word",
     [
@@ -155,6 +160,15 @@ def test_substeps_follow_the_same_motion():
         ({"start": np.full((4, 24, 3), np.nan)}, "start: holds NaN"),
         ({"tolerance": -1e-3}, "tolerance -0.001"),
         ({"collision": np.inf}, "collision inf"),
+        ({"collision": "hard"}, "collision hard: must be a number"),
+        ({"start": groom(4) + 0.5}, "start: a root is 0.866 m from that of rest; give vertices 0 and 1 as in rest"),
+        ({"start": longer(groom(4))}, "start: an edge's length is off by 10 %; give edges as long as"),
+        ({"start": "rest"}, "start: is not an array of numbers"),
+        ({"rest": "abc"}, "rest: is not an array of numbers"),
+        ({"head": "abc"}, "head: is not an array of numbers"),
+        ({"wind": "abc"}, "wind: is not an array of numbers"),
+        ({"body": np.zeros((1, 3, 3)), "triangles": [[0, 1, 2.4]]}, "triangles: are of type float64; give whole"),
+        ({"body": ["abc"], "triangles": [[0, 1, 2]]}, "body: is not an array of numbers"),
         ({"planes": "no"}, "planes 'no': must be True or False"),
         ({"rest_support": None}, "rest_support None: must be True or False"),
     ],
@@ -168,7 +182,20 @@ def test_errors_name_the_argument(change, word):
 @pytest.mark.parametrize("simulator", [simulate, simulate_xpbd])
 @pytest.mark.parametrize(
     "change",
-    [{"dt": 0.0}, {"substeps": 0}, {"substeps": 1.5}, {"margin": np.nan}, {"gravity": -9.81}, {"gravity": np.nan}],
+    [
+        {"dt": 0.0},
+        {"dt": "a"},
+        {"substeps": 0},
+        {"substeps": 1.5},
+        {"substeps": 2.0},
+        {"substeps": True},
+        {"margin": np.nan},
+        {"margin": -0.01},
+        {"margin": "wide"},
+        {"gravity": -9.81},
+        {"gravity": np.nan},
+        {"gravity": "down"},
+    ],
 )
 def test_simulators_refuse_the_same_settings(simulator, change):
     with pytest.raises(NeuralocksError, match=f"{next(iter(change))} {next(iter(change.values()))}"):
