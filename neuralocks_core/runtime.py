@@ -112,20 +112,33 @@ class StrandModel:
         docs/architecture.md, The model file.
 
         Raises:
-            NeuralocksError: an array is not of numbers or has other rows, or the output cannot be computed, is not finite, or too
-                large for hair.
+            NeuralocksError: there is no such graph, output or input, an array is not of finite numbers or has other rows, or the
+                output cannot be computed, is not finite, or too large for hair.
         """
+        for what, name, known in (("graph", graph, OUT), ("output", output, OUT.get(graph, {}))):
+            if name not in known:
+                raise NeuralocksError(f"{what} {name!r}: is unknown; give one of {', '.join(known)}")
+        if inputs.keys() != self._reads[graph].keys():
+            raise NeuralocksError(f"{graph}: reads {', '.join(self._reads[graph])}; give just these arrays")
         inputs = {name: self._rows(graph, name, given) for name, given in inputs.items()}
-        shape = len(next(iter(inputs.values()))), OUT[graph][output]
-        return self._sane(graph, self._computed(graph, [output], inputs)[0], shape)
+        own = {name: len(rows) for name, rows in inputs.items() if name not in self._shared}
+        count = next(iter(own.values()))
+        if set(own.values()) != {count}:
+            raise NeuralocksError(f"{graph}: is given {_named(own)} rows; give as many of each")
+        try:
+            return self._sane(graph, self._computed(graph, [output], inputs)[0], (count, OUT[graph][output]))
+        except NeuralocksError:
+            for name, rows in inputs.items():  # only now: NaN in what is read is NaN in what is given
+                _check_finite(name, rows)
+            raise
 
     def frame(self, vector: np.ndarray) -> dict[str, np.ndarray]:
         """What all strands share in a frame, from a boundary vector (spec.size,), by the tail's input names: `frame_part` (1, 256)
         float32, and more if the frame changes the weights of the tail (docs/architecture.md, The model file).
 
         Raises:
-            NeuralocksError: it is not of this length or not of numbers, or the result cannot be computed, is not finite, or too
-                large for hair.
+            NeuralocksError: it is not of this length or not of finite numbers, or the result cannot be computed, is not finite, or
+                too large for hair.
         """
         values = self._computed("frame.onnx", list(self._shared), {"frame": self.vector(vector)[None]})
         return {
@@ -137,12 +150,13 @@ class StrandModel:
         """A boundary vector that a caller gives, (spec.size,) float32.
 
         Raises:
-            NeuralocksError: it is not of this length, or not of numbers.
+            NeuralocksError: it is not of this length, or not of finite numbers.
         """
         wanted = f"({self.spec.size},)"
         vector = number_array("vector", given, f"{wanted} of a boundary vector", np.float32)
         if vector.shape != (self.spec.size,):
             raise NeuralocksError(f"vector: is of shape {vector.shape}; this model reads {wanted}")
+        _check_finite("vector", vector)
         return vector
 
     def _rows(self, graph: str, name: str, given) -> np.ndarray:
@@ -268,6 +282,11 @@ def _session(graph: bytes):
     # Not its own format, which `odd_part` cannot read.
     options.add_session_config_entry("session.load_model_format", "ONNX")
     return onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
+
+
+def _check_finite(name: str, given: np.ndarray) -> None:
+    if not np.isfinite(given).all():
+        raise NeuralocksError(f"{name}: holds NaN or infinity; give finite numbers")
 
 
 def _fact(error: Exception) -> str:

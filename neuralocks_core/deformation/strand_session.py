@@ -57,7 +57,7 @@ class StrandSession:
         Call `anchor` first if materials or body shape changed. Invalid strands stay at rest.
 
         Raises:
-            NeuralocksError: the vector has the wrong shape, or is not one of numbers.
+            NeuralocksError: the vector has the wrong shape, or is not one of finite numbers.
         """
         frame, gather = self._frame(vector)
         result = self._tail("displacement", frame, gather)

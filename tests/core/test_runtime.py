@@ -89,6 +89,31 @@ def test_what_the_network_does_not_read_is_named(path, strands):
     ):
         with pytest.raises(NeuralocksError, match=rf"^shape: {fact}.* \(n, 72\)"):
             runner.run("encoder.onnx", "code", shape=rows)
+    for read in (session.displacement, session.anchor, runner.frame):
+        with pytest.raises(NeuralocksError, match="^vector: holds NaN or infinity; give finite numbers"):
+            read(np.full(runner.spec.size, np.nan))
+    row, frame = np.zeros((1, 72)), runner.frame(np.zeros(runner.spec.size))
+    tail = {"strand_part": np.zeros((2, 256)), "anchor": np.zeros((2, 72)), "edges": np.zeros((2, 72)), **frame}
+    assert runner.run("tail.onnx", "offsets", **dict(reversed(tail.items()))).shape == (2, 72)
+    for words, inputs, fact in (
+        (("x.onnx", "code"), {"shape": row}, "graph 'x.onnx': is unknown; give one of encoder.onnx, strand.onnx"),
+        (("encoder.onnx", "y"), {"shape": row}, "output 'y': is unknown; give one of code"),
+        (("encoder.onnx", "code"), {}, "encoder.onnx: reads shape; give just these arrays"),
+        (("encoder.onnx", "code"), {"shape": row, "anchor": row}, "encoder.onnx: reads shape; give just"),
+        (("encoder.onnx", "code"), {"shape": row * np.nan}, "shape: holds NaN or infinity"),
+        (
+            ("tail.onnx", "offsets"),
+            tail | {"edges": row},
+            "tail.onnx: is given .* edges .1. rows; give as many",
+        ),
+        (
+            ("tail.onnx", "offsets"),
+            tail | {"strand_part": np.full((2, 256), np.nan)},
+            "strand_part: holds NaN or infinity",
+        ),
+    ):
+        with pytest.raises(NeuralocksError, match=f"^{fact}"):
+            runner.run(*words, **inputs)
     for threads in (0, -1, 1.5, "2"):
         with pytest.raises(NeuralocksError, match=rf"threads '?{threads}'?: must be a whole number from 1 on"):
             StrandModel.load(path, threads=threads)
