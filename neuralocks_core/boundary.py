@@ -88,14 +88,14 @@ class BoundarySampler:
             wind: added to the history, whatever the strength: hair feels a wind w as it feels the head accelerate by -w.
 
         Raises:
-            NeuralocksError: a time, material or strength is not a finite number, an array has the wrong shape, or there is a wind
-                that this spec has no place for.
+            NeuralocksError: a time, material or strength is not a finite number, the strength is below 0, an array has the wrong
+                shape, or there is a wind that this spec has no place for.
         """
         spec, times = self.spec, time_array(times)
         if not np.isfinite(times).all():
             raise NeuralocksError("times: hold NaN or infinity; give seconds")
-        if not (isinstance(strength, Real) and math.isfinite(strength)):
-            raise NeuralocksError(f"strength {strength}: give a number, 0 for the held pose")
+        if not (isinstance(strength, Real) and 0 <= strength < math.inf):
+            raise NeuralocksError(f"strength {strength}: give a number of at least 0, 0 for the held pose")
         if joints is not None:
             wanted = len(times), len(self.character.skeleton.names), 4, 4
             joints = number_array("joints", joints, f"{wanted}")
@@ -123,15 +123,25 @@ class BoundarySampler:
         return result
 
     def held_bind(self, material=(0.0,) * MATERIALS, shape: np.ndarray | None = None) -> np.ndarray:
-        """The vector (spec.size,) of the bind pose held still: the reference for an anchored network's output."""
+        """The vector (spec.size,) of the bind pose held still: the reference for an anchored network's output.
+
+        Args:
+            material: as for `vectors`, (4,).
+            shape: blend shape weights (B,), as the clip has them; those of its first sample if left out.
+
+        Raises:
+            NeuralocksError: material or shape are not finite numbers, or not as many.
+        """
         result = np.zeros(self.spec.size, np.float32)
         parts = self.spec.slices
         result[parts["pose"]] = self.stance[..., :2].swapaxes(-1, -2).ravel()
         result[parts["gravity"]] = GRAVITY / G
-        wanted = f"({self.clip.shape.shape[1]},) blend shape weights"
-        result[parts["shape"]] = self._measures(
-            self.clip.shape[0] if shape is None else number_array("shape", shape, wanted)
-        )
+        first = self.clip.shape[0]
+        wanted = f"{first.shape} blend shape weights"
+        shape = first if shape is None else number_array("shape", shape, wanted)
+        if shape.shape != first.shape or not np.isfinite(shape).all():
+            raise NeuralocksError(f"shape {shape}: give {wanted}, as the clip has, of finite numbers")
+        result[parts["shape"]] = self._measures(shape)
         result[parts["material"]] = _read(material)[0]
         return result
 

@@ -47,7 +47,7 @@ class CarriedHair:
     def turns(
         self, times, strength: float = 1.0, joints: np.ndarray | None = None, wind: Wind | None = None
     ) -> np.ndarray:
-        """Turns (n, N, 4) wxyz float32 in the model's bind axes; the arguments are those of `RigSampler.features`."""
+        """Turns (n, N, 4) wxyz float32 in the model's bind axes; arguments and errors are those of `BoundarySampler.vectors`."""
         result = np.empty((np.size(times), len(self.model.chains), 4), np.float32)
         for rows, sampler in self._parts:
             result[:, rows] = self.model.evaluate(sampler.features(times, strength, joints, wind))[:, rows]

@@ -301,6 +301,8 @@ def test_an_impossible_description_is_refused_in_one_line(values):
         ({"material": "soft"}, "material: is not an array of numbers; give .4,. log-ratios"),
         ({"strength": np.nan}, "strength nan: give a number"),
         ({"strength": "1"}, "strength 1: give a number"),
+        ({"strength": -1.0}, "strength -1.0: give a number of at least 0"),
+        ({"strength": np.inf}, "strength inf: give a number of at least 0"),
         ({"strength": [1.0, 2.0]}, "strength .1.0, 2.0.: give a number"),
         ({"wind": (0, 0, 2)}, "wind .0, 0, 2.: is not a wind; give a .*Wind"),
         ({"joints": [[1], [2, 3]]}, "joints: is not an array of numbers; give .1, 6, 4, 4."),
@@ -314,3 +316,12 @@ def test_what_is_no_material_strength_or_pose_is_refused(change, fact):
     if "material" in change:
         with pytest.raises(NeuralocksError, match=fact):
             sampler.held_bind(**change)
+
+
+@pytest.mark.parametrize("shape", [[0.1], [np.nan, 0.0], [[0.1, 0.2]], 0.1, "thin"])
+def test_a_held_body_has_the_clips_blend_shapes(shape):
+    clip = moved([0.0, 1.0])
+    sampler = BoundarySampler(BoundarySpec(), person(), Clip(clip.times, clip.joints, np.zeros((len(clip.times), 2))))
+    assert np.array_equal(sampler.held_bind(), sampler.held_bind(shape=[0.0, 0.0]))
+    with pytest.raises(NeuralocksError, match=r"^shape.*: .*give \(2,\) blend shape weights"):
+        sampler.held_bind(shape=shape)

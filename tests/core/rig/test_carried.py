@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core.character import Skeleton
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import RigSampler, find_chains, rig_spec
 from neuralocks_core.rig.carried import CarriedHair
@@ -79,3 +80,10 @@ def test_a_hat_without_a_turn_leaves_its_hair_to_the_head(scale):
     hat = [name.rsplit("/", 1)[-1] for name in who.skeleton.names].index("hat")
     motion.joints[20:, hat, :3, :3] *= scale
     assert CarriedHair(model, model.chains.joints, who, motion).carriers.tolist() == [who.head]
+
+
+def test_a_negative_strength_is_refused_as_a_bake_does():
+    who, model = rig()
+    carried = CarriedHair(model, model.chains.joints, who, clip(who.skeleton, "head", NODDING, "head"))
+    with pytest.raises(NeuralocksError, match="strength -1.0: give a number of at least 0, 0 for the held pose"):
+        carried.turns(TIMES, strength=-1.0)
