@@ -29,6 +29,9 @@ class BoundarySpec:
         linear: history of the head's linear motion: "gravity" (effective gravity), "velocity" (in head axes) or "none".
         chest: whether the upper chest's angular velocity is in the history beside the head's.
         taper: share of the history, at its old end, that fades to nothing so that no echo follows a stop.
+
+    Raises:
+        NeuralocksError: a value is impossible, or of another kind.
     """
 
     dt: float = 1 / 30
@@ -39,8 +42,18 @@ class BoundarySpec:
     taper: float = 0.65
 
     def __post_init__(self):
-        object.__setattr__(self, "bins", tuple(index(b) for b in self.bins))
-        object.__setattr__(self, "pose_joints", tuple(self.pose_joints))
+        try:
+            object.__setattr__(self, "bins", tuple(index(b) for b in self.bins))
+            object.__setattr__(self, "pose_joints", tuple(self.pose_joints))
+            self._check()
+        except NeuralocksError:
+            raise
+        except (TypeError, ValueError, OverflowError):  # whose own messages mean nothing to a user
+            raise NeuralocksError(
+                "model: its boundary history has values of a wrong kind; get an undamaged copy"
+            ) from None
+
+    def _check(self) -> None:
         if not 1e-4 < self.dt < 1 or min(self.bins, default=1) < 1 or self.steps > LONGEST:
             raise NeuralocksError(
                 "model: its history has an impossible time step or bin; get an undamaged copy of the model"
@@ -70,14 +83,7 @@ class BoundarySpec:
             )
         if unknown := set(values) - known:
             raise NeuralocksError(f"model: its boundary history has '{min(unknown)}', unknown here; update neuralocks")
-        try:
-            return cls(**values)
-        except NeuralocksError:
-            raise
-        except (TypeError, ValueError, OverflowError):  # whose own messages mean nothing to a user
-            raise NeuralocksError(
-                "model: its boundary history has values of a wrong kind; get an undamaged copy"
-            ) from None
+        return cls(**values)
 
     def to_json(self) -> dict:
         """Plain values for the model file."""

@@ -132,11 +132,13 @@ class Clip:
         """Times inside the clip: clamped, or modulo the period of a loop.
 
         Raises:
-            NeuralocksError: a time is NaN.
+            NeuralocksError: a time is NaN, or infinite in a loop.
         """
         if np.isnan(times).any():
             raise NeuralocksError("times: hold NaN; give seconds")
         if self.period > 0:
+            if np.isinf(times).any():
+                raise NeuralocksError("times: hold infinity, where a loop has no pose; give seconds")
             inside = (times >= self.start) & (times <= self.end)
             return np.where(inside, times, self.start + np.mod(times - self.start, self.period))
         return np.clip(times, self.start, self.end)

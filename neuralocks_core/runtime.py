@@ -72,7 +72,8 @@ class StrandModel:
         self.anchored = file.meta.get("anchored", False)
         if not isinstance(self.anchored, bool):
             raise NeuralocksError(f"{file.path}: its 'anchored' is neither true nor false; get an undamaged copy")
-        if threads is not None and not (isinstance(threads, Integral) and threads >= 1):
+        whole = isinstance(threads, Integral) and not isinstance(threads, bool)
+        if threads is not None and not (whole and threads >= 1):
             raise NeuralocksError(f"threads {threads!r}: must be a whole number from 1 on; leave it out for one a core")
         self.threads = threads or cores()
         self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="neuralocks")

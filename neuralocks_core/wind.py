@@ -47,7 +47,7 @@ class Wind:
             raise NeuralocksError(f"wind: {self.mean} is not a vector; give three numbers [m/s^2]")
         if (size := math.hypot(*mean)) > STRONGEST * (1 + 1e-6):
             raise NeuralocksError(f"wind: is {size:.3g} m/s^2 strong; give at most {STRONGEST:g} (gravity is 9.81)")
-        if not (isinstance(self.gusts, Real) and 0 <= self.gusts <= 1):
+        if not (isinstance(self.gusts, Real) and not isinstance(self.gusts, bool) and 0 <= self.gusts <= 1):
             raise NeuralocksError(f"gusts {self.gusts}: give a share of the wind from 0 to 1")
         object.__setattr__(self, "mean", tuple(mean.tolist()))
 
@@ -57,8 +57,15 @@ class Wind:
         Args:
             times: any.
             period: of a motion that repeats [s]: the gusts then repeat with it. 0 if it does not.
+
+        Raises:
+            NeuralocksError: a time is not a finite number, or the period is none of 0 or above.
         """
-        mean, times = np.array(self.mean), np.asarray(times, float)
+        mean, times = np.array(self.mean), number_array("times", times, "seconds")
+        if not np.isfinite(times).all():
+            raise NeuralocksError("times: hold NaN or infinity; give seconds")
+        if not (isinstance(period, Real) and 0 <= period < math.inf):
+            raise NeuralocksError(f"period {period}: give seconds, 0 for motion that does not repeat")
         rates = np.maximum(np.round(FREQUENCIES * period), 1) / period if period > 0 else FREQUENCIES
         turns = 2 * np.pi * rates * times[..., None]
         along, across = ((SHARES * np.sin(turns + phase)).sum(-1)[..., None] for phase in PHASES)

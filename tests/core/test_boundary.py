@@ -272,10 +272,12 @@ def test_unknown_description_asks_for_an_update():
         {"bins": ["x"]},
         {"bins": [float("inf")]},
         {"bins": [1.5]},
+        {"bins": (1.0,)},
         {"bins": 3},
         {"bins": [0]},
         {"bins": [2] * 1001},
         {"dt": "a"},
+        {"dt": None},
         {"dt": float("nan")},
         {"taper": "a"},
         {"taper": -0.1},
@@ -291,6 +293,9 @@ def test_unknown_description_asks_for_an_update():
 def test_an_impossible_description_is_refused_in_one_line(values):
     with pytest.raises(NeuralocksError, match="^model: "):
         BoundarySpec.from_json(values)
+    if isinstance(values, dict):
+        with pytest.raises(NeuralocksError, match="^model: "):
+            BoundarySpec(**values)
 
 
 @pytest.mark.parametrize(

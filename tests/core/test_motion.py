@@ -40,6 +40,9 @@ def test_a_loop_goes_on():
     clip = moved([0.0, 1.0, 2.0], lambda t: np.stack([np.sin(np.pi * t), 0 * t, 0 * t], axis=-1), loop=True)
     assert np.allclose(clip.at([0.4]), clip.at([4.4]))
     assert np.allclose(clip.at([0.4]), clip.at([-1.6]))
+    for ask in (clip.at, clip.shape_at):
+        with pytest.raises(NeuralocksError, match="times: hold infinity, where a loop has no pose; give seconds"):
+            ask([0.4, np.inf])
 
 
 def test_a_loop_that_walks_on_ends_with_its_last_sample():

@@ -114,7 +114,7 @@ def test_what_the_network_does_not_read_is_named(path, strands):
     ):
         with pytest.raises(NeuralocksError, match=f"^{fact}"):
             runner.run(*words, **inputs)
-    for threads in (0, -1, 1.5, "2"):
+    for threads in (0, -1, 1.5, "2", True):
         with pytest.raises(NeuralocksError, match=rf"threads '?{threads}'?: must be a whole number from 1 on"):
             StrandModel.load(path, threads=threads)
     with pytest.raises(NeuralocksError, match="is a folder"):  # the current one, and not the shipped model

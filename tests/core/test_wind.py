@@ -62,11 +62,29 @@ def test_a_wind_straight_up_or_down_has_gusts_across_too(mean):
         ((1, 0, 0), "0.5", "gusts 0.5: give a share"),
         ((1, 0, 0), 1.5, "gusts 1.5: give a share of the wind from 0 to 1"),
         ((1, 0, 0), np.nan, "gusts nan"),
+        ((1, 0, 0), True, "gusts True"),
     ],
 )
 def test_what_is_no_wind_is_refused(mean, gusts, said):
     with pytest.raises(NeuralocksError, match=said):
         Wind(mean, gusts)
+
+
+@pytest.mark.parametrize(
+    ("times", "period", "said"),
+    [
+        ([0.0, np.nan], 0.0, "times: hold NaN or infinity"),
+        (np.inf, 2.0, "times: hold NaN or infinity"),
+        (["1"], 0.0, "times: is not an array of numbers"),
+        ([0.0], np.inf, "period inf: give seconds"),
+        ([0.0], np.nan, "period nan: give seconds"),
+        ([0.0], -3, "period -3: give seconds"),
+        ([0.0], "3", "period 3: give seconds"),
+    ],
+)
+def test_times_and_periods_that_are_none_are_refused(times, period, said):
+    with pytest.raises(NeuralocksError, match=said):
+        Wind((1, 0, 0)).at(times, period)
 
 
 def test_a_steady_wind_is_felt_as_a_head_that_accelerates_against_it():
