@@ -32,7 +32,7 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
             check_real(selected if armatures else [*selected, *local])
         if not armatures:
             raise NeuralocksError("Character: this scene has no armature; add or import the rig of your character")
-        armature = _character(armatures, hairs, selected, local)
+        armature = _character(armatures, hairs, selected, scene)
         hair = hairs[0] if hairs and hairs[0] in selected else _hair(hairs, armature, armatures)
         settings.armature, settings.hair = armature, hair
         if hair is not None and hair.neuralocks_hair.armature is None:
@@ -42,7 +42,7 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
         return f"Character {armature.name_full}, {f'hair {hair.name_full}' if hair else none}"
 
 
-def _character(armatures, hairs, selected, things):
+def _character(armatures, hairs, selected, scene):
     """The armature that is selected, or carries selected hair or a mesh; otherwise the first in the scene that carries hair, that
     deforms a mesh, or the first of all: a rig's template may be beside it.
     """
@@ -50,7 +50,7 @@ def _character(armatures, hairs, selected, things):
         return armatures[0]
     carried = [_carrier(thing) for kind in ("CURVES", "MESH") for thing in selected if thing.type == kind]
     with_hair = [_carrier(hair) for hair in hairs]
-    found = [a for a in armatures if a in with_hair] or [a for a in armatures if find(a, things)] or armatures
+    found = [a for a in armatures if a in with_hair] or [a for a in armatures if find(a, scene)] or armatures
     return next(a for a in [*carried, *found] if a in armatures)
 
 

@@ -15,6 +15,7 @@ from ..services.rig import BodyArrays
 from ..session import session
 from .armature import matrix
 from .binding import carrier, carrying_bone
+from .shown import in_renders
 from .skinned import deformed, moving_groups
 
 PROBES = 500
@@ -23,9 +24,11 @@ WEIGHED = 4000
 """Vertices whose weights are read in one step."""
 
 
-def find(armature, objects) -> list:
-    """The visible meshes that this armature deforms, by name; without those whose faces only come from modifiers."""
-    meshes = [o for o in objects if o.type == "MESH" and not o.hide_render and len(o.data.polygons)]
+def find(armature, scene) -> list:
+    """The meshes that this armature deforms and that a render of the scene draws in any frame, by name; without those whose faces
+    only come from modifiers.
+    """
+    meshes = [o for o in in_renders(scene) if o.type == "MESH" and len(o.data.polygons)]
     return sorted((o for o in meshes if deformed(o, armature)), key=lambda o: o.name_full)
 
 

@@ -11,8 +11,8 @@ def hairs_of(armature, scene) -> list:
 
 
 def bodies_of(armature, scene) -> list:
-    """The body mesh chosen by the artist, otherwise all meshes that the armature deforms."""
+    """The body mesh chosen by the artist, otherwise all meshes that the armature deforms and that are rendered."""
     chosen = armature.neuralocks_character.body
     if chosen is not None and chosen.type == "MESH" and in_scene(chosen, scene):
         return [chosen]
-    return body_reader.find(armature, scene.objects)
+    return body_reader.find(armature, scene)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a view layer shows, and so evaluates; and what is rendered."""
 
+from collections.abc import Iterator
+
 from .animated import animated
 
 
@@ -13,18 +15,22 @@ def enabled(thing, layer, mode: str = "VIEWPORT") -> bool:
     if mode == "VIEWPORT" and thing.visible_get(view_layer=layer):
         return True
     off = "hide_render" if mode == "RENDER" else "hide_viewport"
-    return not getattr(thing, off) and _within(layer.layer_collection, set(thing.users_collection), off)
+    held = set(thing.users_collection)
+    return not getattr(thing, off) and any(each in held for each in _included(layer.layer_collection, off))
 
 
-def in_renders(thing, scene) -> bool:
-    """Whether a render of the scene draws an object in any frame."""
-    drawn = any(enabled(thing, layer, "RENDER") for layer in scene.view_layers if layer.use)
-    return drawn or "hide_render" in animated(thing.animation_data)
+def in_renders(scene) -> set:
+    """Objects that a render of the scene draws in any frame. All at once, because it takes as long to find the collections of one."""
+    roots = (layer.layer_collection for layer in scene.view_layers if layer.use)
+    drawn = {each for root in roots for each in _included(root, "hide_render")}
+    of = (thing for each in drawn for thing in each.objects)
+    return {thing for thing in of if not thing.hide_render or "hide_render" in animated(thing.animation_data)}
 
 
-def _within(branch, collections: set, off: str) -> bool:
-    """Whether a branch of a view layer includes one of some collections; a child may be included while its parent is not."""
-    if getattr(branch.collection, off):
-        return False
-    own = branch.collection in collections and not branch.exclude
-    return own or any(_within(child, collections, off) for child in branch.children)
+def _included(branch, off: str) -> Iterator:
+    """Collections that a branch of a view layer includes; a child may be included while its parent is not."""
+    if not getattr(branch.collection, off):
+        if not branch.exclude:
+            yield branch.collection
+        for child in branch.children:
+            yield from _included(child, off)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import bpy
 
+from dcc_addon.scene.up_to_date import ensure, notice
+from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at
 
@@ -46,6 +48,45 @@ def swapped_in(_folder: Path) -> None:
         assert len(bpy.data.objects) == 3
     for shown, keyed, disabled in zip(*found, strict=True):
         assert max(apart(keyed, shown), apart(disabled, shown)) < SAME
+
+
+def bodies_in_renders(_folder: Path) -> None:
+    """Hair is kept out of the meshes that renders draw in any frame, whichever is shown; the motion is out of date when a body, or
+    its collection, is hidden in renders.
+    """
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    scenes.body(rig)
+    helmet, strands = scenes.body(rig), scenes.hair(rig, 5)
+    helmet.name, hats = "Helmet", bpy.data.collections.new("Hats")
+    scene.collection.children.link(hats)
+    hats.objects.link(helmet)
+    scene.collection.objects.unlink(helmet)
+    layer = bpy.context.view_layer.layer_collection.children["Hats"]
+    make_live(rig, strands)
+
+    def bodies() -> tuple[str, ...]:
+        notice(rig, scene)
+        known = session.rigs["Rig"]
+        found = ensure(bpy.context, rig)
+        assert known.stale == (found is not known) == (found.bodies != known.bodies)
+        return found.bodies
+
+    assert bodies() == ("Body", "Helmet")
+    for holder, setting in ((helmet, "hide_render"), (hats, "hide_render"), (layer, "exclude")):
+        for hidden, expected in ((True, ("Body",)), (False, ("Body", "Helmet"))):
+            setattr(holder, setting, hidden)
+            assert bodies() == expected, setting
+    for frame, hidden in ((1, True), (12, False)):
+        helmet.hide_render = hidden
+        helmet.keyframe_insert("hide_render", frame=frame)
+    for frame, other in ((3, 20), (20, 3)):
+        scene.frame_set(frame)
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+        scene.frame_set(other)
+        assert bodies() == ("Body", "Helmet"), frame
+    layer.exclude = True
+    assert bodies() == ("Body",)
 
 
 def _baked(out: Path, hang, hide) -> dict:
