@@ -111,21 +111,26 @@ def free_modes(armature, bones, modes=tuple(CHANNELS), without=()) -> dict[str, 
 
 
 def check_free(armature, bones) -> None:
-    """Refuse bones turned by anything other than their own and their parent's rotation: hair would be turned twice.
+    """Refuse bones turned by anything other than their own and their parent's rotation, in any frame: hair would be turned twice.
 
     Raises:
         NeuralocksError: one has a constraint, or does not turn with its parent.
     """
+    written = None  # many rigs have hundreds of curves, and few have constraints on hair bones
     for name in bones:
         bone = armature.pose.bones.get(name)
         if bone is None:  # renamed: whoever reads the pose reports that
             continue
-        acting = next((c.name for c in bone.constraints if not c.mute and c.influence), None)
-        if acting is not None:
-            raise NeuralocksError(
-                f"{armature.name_full}: hair bone '{name}' has the constraint '{acting}', which would turn it a second time; mute "
-                "the constraint"
-            )
+        for constraint in bone.constraints:
+            written = animated(armature.animation_data) if written is None else written
+            keyed = constraint.path_from_id("mute") in written
+            acts = constraint.influence or constraint.path_from_id("influence") in written
+            if acts and (keyed or not constraint.mute):
+                remedy = "remove the animation of its mute, then mute it" if keyed else "mute the constraint"
+                raise NeuralocksError(
+                    f"{armature.name_full}: hair bone '{name}' has the constraint '{constraint.name}', which would turn it a second "
+                    f"time; {remedy}"
+                )
         if not bone.bone.use_inherit_rotation:
             raise NeuralocksError(
                 f"{armature.name_full}: hair bone '{name}' does not turn with its parent; turn on Inherit Rotation (bone "

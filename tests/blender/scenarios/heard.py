@@ -27,6 +27,17 @@ def turned_otherwise(folder: Path) -> None:
     limit.mute, bone.bone.use_inherit_rotation = True, False
     refused(bpy.ops.neuralocks.bake_keys, "hair.01", "Inherit Rotation")
     bone.bone.use_inherit_rotation = True
+    limit.mute = False
+    for setting, values in (("influence", (0.0, 1.0)), ("mute", (True, False))):  # off in the frame that is shown
+        for frame, value in zip((11, 12), values):
+            setattr(limit, setting, value)
+            limit.keyframe_insert(setting, frame=frame)
+        scene.frame_set(5)
+        refused(bpy.ops.neuralocks.bake_keys, "hair.01", "'Limit Rotation'", "mute")
+        limit.mute = True
+        if setting == "influence":
+            assert bpy.ops.neuralocks.bake_keys() == bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+    bone.constraints.remove(limit)
     rig.animation_data.use_nla = False
     refused(bpy.ops.neuralocks.bake_keys, "NLA is switched off")
     rig.animation_data.use_nla = True
