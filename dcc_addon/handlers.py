@@ -52,6 +52,7 @@ def before_update(*_):
 @persistent
 def on_update(scene, graph):
     """Something was edited: follow a pose made by hand, and notice edited animation."""
+    switched, session.switched = session.switched, set()
     if session.paused:
         return
     live.forget_gone()
@@ -70,7 +71,7 @@ def on_update(scene, graph):
         return
     meshes = {u.id.name_full for u in graph.updates if isinstance(u.id, bpy.types.Mesh) and u.is_updated_geometry}
     edited = meshes and any(b.data.name_full in meshes for a in live.carriers(scene) for b in bodies_of(a, scene))
-    if edited or any(isinstance(thing, bpy.types.Action) for thing in changed):
+    if edited or any(isinstance(thing, bpy.types.Action) and thing.name_full not in switched for thing in changed):
         _mark_stale()
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
         session.wanting = session.wanting or bool(session.failed)

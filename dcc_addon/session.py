@@ -139,6 +139,8 @@ class Session:
     """Live hair that another model moved when the file was saved; see `renewed`."""
     edits: int = 0
     """How often animation was edited: what was sampled meanwhile is out of date."""
+    switched: set[str] = field(default_factory=set)
+    """Actions that Blender will report as edited, because some of their curves were muted; see `scene.switches`."""
     wanting: bool = False
     """Whether live hair found its motion missing or out of date since this was last handled."""
     remade: Remade | None = None

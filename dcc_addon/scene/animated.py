@@ -22,12 +22,22 @@ def strips_of(data, without=()) -> list:
     return strips
 
 
-def _playing(data, without=()) -> list:
-    """F-curves of drivers, actions and strips that are not muted."""
+def curves_of(data, without=()) -> list:
+    """F-curves of drivers, actions and strips, muted or not, except those of NLA tracks of the names `without`; none if there is no
+    such data.
+    """
     if data is None:
         return []
-    played = [curve for user in (data, *strips_of(data, without)) for curve in _curves(user)]
-    return [curve for curve in [*data.drivers, *played] if not _muted(curve)]
+    return [*data.drivers, *(curve for user in (data, *strips_of(data, without)) for curve in _curves(user))]
+
+
+def is_muted(curve) -> bool:
+    """Whether an F-curve does not play."""
+    return curve.mute or (curve.group is not None and curve.group.mute)
+
+
+def _playing(data, without=()) -> list:
+    return [curve for curve in curves_of(data, without) if not is_muted(curve)]
 
 
 def _constant(curve) -> bool:
@@ -42,7 +52,3 @@ def _curves(user) -> list:
         return list(action.fcurves) if action is not None else []
     bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
     return [curve for bag in bags if bag.slot_handle == user.action_slot_handle for curve in bag.fcurves]
-
-
-def _muted(curve) -> bool:
-    return curve.mute or (curve.group is not None and curve.group.mute)

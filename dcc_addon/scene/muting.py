@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modifiers of hair that the live view, or a cache, already moves: those that would move it a second time are off meanwhile,
-and those that grow more hair beside it use the posed surface. Their settings are stored with the hair, and restored.
+"""Modifiers of hair that the live view, or a cache, already moves: those that would move it a second time are off meanwhile, in
+all frames, and those that grow more hair beside it use the posed surface. Their settings are stored with the hair, and restored.
 """
 
 import json
 
-from . import blur, unbound
+from . import blur, switches, unbound
 from .nodes import inputs_of, read_input, write_input
 from .remembered import remembered
 
@@ -32,9 +32,13 @@ def mute_deformers(hair, kept: str = "muted") -> None:
         shown, before = modifier.show_viewport or modifier.show_render, found.get(modifier.name, ())
         hidden = any(isinstance(value, bool) for value in before)  # otherwise its inputs are remembered, if anything is
         if _moves(modifier, hair):
+            switched = switches.mute(modifier)
+            if (shown or switched) and not hidden:
+                found[modifier.name] = _before(hair, modifier, found)
+            if switched:
+                places, more = found[modifier.name][:2], found[modifier.name][2:]
+                found[modifier.name] = [*places, *sorted({*more, *switched})]
             if shown:
-                if not hidden:
-                    found[modifier.name] = _before(hair, modifier, found)
                 modifier.show_viewport = modifier.show_render = False
             continue
         deforms = deforms or (shown and _has(_tree(modifier), {DEFORM}))
@@ -64,7 +68,8 @@ def unmute_deformers(hair, kept: str = "muted") -> None:
         if inputs:
             _write(hair, modifier, [name for name in _resting(modifier) if name in before], True)
         else:
-            modifier.show_viewport, modifier.show_render = before
+            modifier.show_viewport, modifier.show_render, *switched = before
+            switches.unmute(modifier, switched)
     setattr(settings, kept, "")
 
 
@@ -72,7 +77,10 @@ def off_meanwhile(hair) -> list[str]:
     """Names of the modifiers that are switched off as a whole while the hair is live, or plays a cache."""
     own = hair.neuralocks_hair
     found = [
-        name for kept in (own.muted, own.replaced) for name, before in remembered(kept, _fits).items() if True in before
+        name
+        for kept in (own.muted, own.replaced)
+        for name, before in remembered(kept, _fits).items()
+        if isinstance(before[0], bool) and any(before)
     ]
     return [name for name in dict.fromkeys(found) if name in hair.modifiers]
 
@@ -91,13 +99,16 @@ def on_top(hair) -> list[str]:
 
 
 def _fits(values: list) -> bool:
-    """Whether these values can be a modifier's: where it was shown, or which of its inputs were on."""
-    shown = len(values) == 2 and all(isinstance(value, bool) for value in values)
+    """Whether these values can be a modifier's: where it was shown, and which of `switches.KINDS` played; or which of its inputs
+    were on.
+    """
+    shown = len(values) >= 2 and all(isinstance(value, bool) for value in values[:2])
+    shown = shown and all(value in switches.KINDS for value in values[2:])
     return shown or (bool(values) and all(isinstance(value, str) for value in values))
 
 
 def _before(hair, modifier, found: dict) -> list[bool]:
-    """How to show a modifier that is not among those remembered: as it is shown now; or, if it is one of them that was renamed and
+    """What is stored of a modifier that is not among those remembered: as it is shown now; or, if it is one of them that was renamed and
     then switched on by hand in one place, as that one was.
     """
     gone = [name for name, before in found.items() if name not in hair.modifiers and isinstance(before[0], bool)]

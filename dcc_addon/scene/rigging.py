@@ -194,12 +194,20 @@ def _animated_by(data) -> list:
     for strip in strips_of(data, HAIR):
         found += [strip.name, *_values(strip, _settings(strip)), *(_keys(curve) for curve in strip.fcurves)]
     for curve in data.drivers:
+        if _of_hair(curve):
+            continue
         driver = curve.driver
         found += [curve.data_path, curve.array_index, curve.mute, _keys(curve), driver.type, driver.expression]
         for variable in driver.variables:
             found += [variable.name, variable.type]
             found += [part for target in variable.targets for part in _values(target, _settings(target))]
     return found
+
+
+def _of_hair(curve) -> bool:
+    """Whether a driver sets a modifier of hair, which moves no rig, and may be muted while the hair is live."""
+    owner = curve.id_data
+    return isinstance(owner, bpy.types.Object) and owner.type == "CURVES" and curve.data_path.startswith("modifiers[")
 
 
 def _keys(curve) -> list:

@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 
 from dcc_addon.scene.nodes import geometry_nodes
+from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import make_live, messages, points_at
 
@@ -103,3 +104,68 @@ def left_out_of_the_file(folder: Path) -> None:
         modifier.node_group = geometry_nodes(name)[0]
         modifier.show_viewport = modifier.show_render = shown
     assert said().endswith("; not in the file: modifiers 'Frizz', 'Curl' (Bake and Attach plays below them)"), said()
+
+
+def switched_over_time(folder: Path) -> None:
+    """What shows or hides a modifier over time, keys or drivers, does not switch it on while the hair is live or plays a cache, and
+    does so again afterwards; the motion is not out of date for that.
+    """
+    from dcc_addon.scene.muting import off_meanwhile
+    from dcc_addon.scene.up_to_date import notice
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 20)
+    strands.data.surface = scenes.body(rig)
+    modifier, own = scenes.surface_deform(strands), strands.neuralocks_hair
+    for frame, shown in ((1, False), (5, True)):
+        for setting in ("show_viewport", "show_render"):
+            setattr(modifier, setting, shown)
+            modifier.keyframe_insert(setting, frame=frame)
+    keys, muted, driver = *scenes.fcurves(strands), modifier.driver_add("show_render")
+    driver.driver.expression, muted.mute = "frame > 4", True
+    curves = {"driver": driver, "keys": keys}
+
+    def plays() -> bool:
+        now = [not curve.mute for curve in curves.values()]
+        assert len(set(now)) == 1 and muted.mute, now
+        return now[0]
+
+    def shown_at(frame) -> list[bool]:
+        points_at(strands, frame)
+        bpy.context.view_layer.update()
+        return [modifier.show_viewport, modifier.show_render]
+
+    as_keyed = {frame: shown_at(frame) for frame in (3, 9)}
+    assert plays() and as_keyed == {3: [False, False], 9: [True, True]}
+    for frame in (3, 9):
+        scene.frame_set(frame)
+        make_live(rig, strands)
+        bpy.context.view_layer.update()
+        for at in (4, 9, 2, 10):
+            assert shown_at(at) == [False, False] and not plays() and not messages(), messages()
+        notice(rig, scene)
+        assert not session.rigs["Rig"].stale and off_meanwhile(strands) == [modifier.name]
+        own.live = False
+        assert plays() and {at: shown_at(at) for at in as_keyed} == as_keyed
+    if HAS_USD:
+        scene.frame_set(3)
+        assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / "cache.usdc")) == {"FINISHED"}
+        assert shown_at(9) == [False, False] and not plays()
+        assert bpy.ops.neuralocks.detach() == {"FINISHED"}
+        assert plays() and {at: shown_at(at) for at in as_keyed} == as_keyed
+    make_live(rig, strands)
+    shown_at(9)
+    modifier.name = "Renamed"
+    own.live = False
+    assert plays() and {at: shown_at(at) for at in as_keyed} == as_keyed
+    for text in (
+        '{"Renamed": [true, true, "keys"]}',
+        '{"Renamed": [true, true, 5]}',
+        '{"Renamed": [true, [], "keys of name"]}',
+    ):
+        own.muted = text
+        own.live = True
+        shown_at(9)
+        own.live = False
+        assert plays() and {at: shown_at(at) for at in as_keyed} == as_keyed
