@@ -22,6 +22,8 @@ HAIR = TRACK, BEFORE, TRACK + OVERRIDE, BEFORE + OVERRIDE
 """All names of these tracks."""
 KEPT = "neuralocks_rotations"
 """Property of the action that holds the hair bones' earlier rotations."""
+OF = "neuralocks_armature"
+"""Property of both actions that names the armature: it finds them when their tracks were deleted by hand."""
 LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
 """The number of this interpolation: that of many keys is written at once by numbers only."""
 STILL = 1e-6
@@ -41,7 +43,7 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     Returns:
         the action of the hair's motion.
     """
-    remove(armature)
+    _take_off(armature)
     data = armature.animation_data or armature.animation_data_create()
     # The artist's own keys on a bone, which may be in the action above all strips, stay and have no effect.
     modes = rotations.free_modes(armature, bones, rotations.KEYED, without=HAIR)
@@ -57,6 +59,7 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     _strip(data, BEFORE + ending, below)
     action = _action(armature, f"{armature.name} Hair", modes, frames, turns)
     action[KEPT] = before
+    action[OF] = below[OF] = armature.name
     _strip(data, TRACK + ending, action)
     return action
 
@@ -123,13 +126,14 @@ def check_mode_left(armature, bones) -> None:
 
 
 def has_keys(armature) -> bool:
-    """Whether its hair bones are baked."""
-    return bool(_tracks(armature))
+    """Whether there is a bake of its hair bones to remove: its tracks, or at least its actions."""
+    return bool(_tracks(armature) or _orphans(armature))
 
 
 def beside_others(armature) -> bool:
     """Whether its hair bones are baked and play besides everything else: if their track is solo, nothing else plays."""
-    return has_keys(armature) and not any(track.is_solo for track in _tracks(armature))
+    tracks = _tracks(armature)
+    return bool(tracks) and not any(track.is_solo for track in tracks)
 
 
 def as_before(armature) -> dict[str, dict[str, list]]:
@@ -141,9 +145,20 @@ def as_before(armature) -> dict[str, dict[str, list]]:
 
 
 def remove(armature) -> str:
-    """Remove an earlier bake and turn the bones as they were before it. Tracks from the file of an overridden character, which
-    Blender would bring back when this file is opened, are muted; returns that file's name, empty if there are none.
+    """Remove an earlier bake and turn the bones as they were before it, also one whose tracks were deleted by hand. Tracks from the
+    file of an overridden character, which Blender would bring back when this file is opened, are muted; returns that file's name,
+    empty if there are none.
     """
+    orphans = _orphans(armature)
+    muted = _take_off(armature)
+    for action in reversed(orphans):  # the oldest bake knows the artist's own rotations
+        rotations.give_back(armature, action.get(KEPT, ""), keyed=True)
+        _drop(action)
+    return muted
+
+
+def _take_off(armature) -> str:
+    """Remove a bake that is on tracks, as `remove` does."""
     tracks, actions, lasting = _tracks(armature), _actions(armature), _of_library(armature)
     muted = _library(armature) if any(track in lasting for track in tracks) else ""
     for track in tracks:
@@ -154,9 +169,16 @@ def remove(armature) -> str:
             armature.animation_data.nla_tracks.remove(track)
     for action in actions:
         rotations.give_back(armature, action.get(KEPT, ""))
-        if not action.users:
-            bpy.data.actions.remove(action)
+        _drop(action)
     return muted
+
+
+def _drop(action) -> None:
+    """Delete an action, or if somebody keeps it, leave it to them."""
+    if not action.users:
+        bpy.data.actions.remove(action)
+    elif action.library is None:
+        action.pop(OF, None)
 
 
 @contextmanager
@@ -223,6 +245,12 @@ def _library(armature) -> str:
 
 def _actions(armature) -> list:
     return [strip.action for track in _tracks(armature) for strip in track.strips if strip.action]
+
+
+def _orphans(armature) -> list:
+    """Actions of bakes of this armature that nothing plays any longer, oldest first."""
+    own = [action for action in bpy.data.actions if action.get(OF) == armature.name and action.library is None]
+    return [action for action in own if action.users <= action.use_fake_user]
 
 
 def _strip(data, name: str, action) -> None:

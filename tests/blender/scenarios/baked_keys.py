@@ -207,3 +207,46 @@ def strands_beside_keyed_bones(folder: Path) -> None:
     as_baked()
     track.is_solo = False
     assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+
+
+def tracks_deleted_by_hand(folder: Path) -> None:
+    """Baked keys whose tracks were deleted in the NLA editor, one or both, are still removed: the hair bones turn as the artist had
+    keyed them, also after another bake; other characters' are not, and what the artist has keyed since stays.
+    """
+    rigs = [scenes.armature(name, bones=scenes.BONES + scenes.TAIL) for name in ("Rig", "Other")]
+    for rig in rigs:
+        scenes.dance(rig)
+        bone = rig.pose.bones["hair.01"]
+        for frame, angle in ((1, 0.2), (24, 0.9)):
+            bone.rotation_euler = angle, 0.1, 0
+            bone.keyframe_insert("rotation_euler", frame=frame)
+    rig, other = rigs
+    bone = rig.pose.bones["hair.01"]
+    expected = {frame: bones_at(rig, frame) for frame in (1, 9, 24)}
+    give_bone_model(rig, folder)
+
+    def bake_and_delete(*names) -> None:
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        for name in names:
+            rig.animation_data.nla_tracks.remove(rig.animation_data.nla_tracks[name])
+
+    for names in (("Neuralocks Hair",), ("Neuralocks Before Hair",), ("Neuralocks Hair", "Neuralocks Before Hair")):
+        bake_and_delete(*names)
+        bpy.data.actions["Rig Hair"].use_fake_user = True
+        bpy.context.scene.neuralocks.armature = other
+        refused(bpy.ops.neuralocks.remove_keys, "Other", "no baked hair keys")
+        bpy.context.scene.neuralocks.armature = rig
+        bake_and_delete(*names)
+        assert bone.rotation_mode == "QUATERNION"
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+        assert not rig.animation_data.nla_tracks and bone.rotation_mode == "XYZ"
+        for frame, matrices in expected.items():
+            assert apart(bones_at(rig, frame), matrices) < 1e-6, (names, frame)
+        refused(bpy.ops.neuralocks.remove_keys, "Rig", "no baked hair keys")
+        for action in [action for action in bpy.data.actions if "Hair" in action.name]:
+            bpy.data.actions.remove(action)
+    bake_and_delete("Neuralocks Hair", "Neuralocks Before Hair")
+    bone.keyframe_insert("rotation_quaternion", frame=1)
+    bone.keyframe_delete("rotation_euler", frame=1)
+    bone.keyframe_delete("rotation_euler", frame=24)
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"} and bone.rotation_mode == "QUATERNION"
