@@ -26,7 +26,9 @@ class NEURALOCKS_OT_find(Hardened, bpy.types.Operator):
         settings, scene = context.scene.neuralocks, context.scene
         # An override comes before the linked object that it overrides, which may be in the scene too.
         local = sorted(scene.objects, key=lambda thing: thing.library is not None)
-        selected, chosen = context.selected_objects, [*context.selected_objects, *local]
+        layer = context.view_layer  # a script may run without a window, which alone has `selected_objects`
+        selected = [thing for thing in layer.objects.selected if thing.visible_get(view_layer=layer)]
+        chosen = [*selected, *local]
         armatures, hairs = ([o for o in chosen if o.type == kind] for kind in ("ARMATURE", "CURVES"))
         if not any(thing.type == "ARMATURE" for thing in selected):
             check_real(selected if armatures else [*selected, *local])

@@ -27,7 +27,8 @@ def choose(context, name: str = "") -> tuple:
     Raises:
         NeuralocksError: there is none.
     """
-    objects = [thing for thing in (context.active_object, *context.scene.objects) if thing is not None]
+    first = context.view_layer.objects.active  # `active_object` needs a window
+    objects = [thing for thing in (first, *context.scene.objects) if thing is not None]
     if name:
         for thing in objects:
             if name in thing.particle_systems:

@@ -46,6 +46,28 @@ def _found(selected) -> tuple:
     return settings.armature, settings.hair
 
 
+def without_a_window(_folder: Path) -> None:
+    """Timers and scripts on a farm, which have no window, find what is selected, and convert the particle hair of the active object."""
+    from dcc_addon.scene import particles
+
+    rig, other = scenes.armature(), scenes.armature("Zoe")
+    scenes.hair(rig, 5)
+    choose(other)
+    rig.select_set(True)
+    rig.hide_set(True)
+    plain, skin = scenes.body(rig), scenes.body(other)
+    for thing in (plain, skin):
+        thing.modifiers.new("Fur", "PARTICLE_SYSTEM")
+        thing.particle_systems[0].settings.type = "HAIR"
+    with bpy.context.temp_override(window=None):
+        assert bpy.ops.neuralocks.find() == {"FINISHED"}
+        assert bpy.context.scene.neuralocks.armature == other
+        bpy.context.view_layer.objects.active = skin
+        assert particles.choose(bpy.context)[0] == skin
+        assert bpy.ops.neuralocks.from_particles() == {"FINISHED"}
+    assert not particles.waiting(skin) and particles.waiting(plain)
+
+
 def head_of_a_control_rig(_folder: Path) -> None:
     """As Rigify makes it: `head` is a control that moves no skin, and the bone that moves it copies it, below other bones. Both
     ways of naming it give the same character, and hair as on a plain rig.
