@@ -76,7 +76,8 @@ def on_update(scene, graph):
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
         session.wanting = session.wanting or bool(session.failed)
         session.failed.clear()
-    if names & objects.keys():
+    bodies = {body for name in names & session.rigs.keys() for body in session.rigs[name].bodies}
+    if (names | bodies) & objects.keys():
         background.doubt()
     if names & objects.keys() or any(_edited(o.original) for o in objects.values()):
         live.update(scene, graph)

@@ -48,13 +48,13 @@ def posture(things) -> int:
 
 
 def _reached(things) -> list:
-    """These objects, and those on whose place or pose they depend."""
+    """These objects, and those on whose place or pose they, or the shape of a body, depend."""
     found = {thing.name_full: thing for thing in things}
     waiting = list(found.values())
     while waiting:
         thing = waiting.pop()
         bones = thing.pose.bones if thing.pose else ()
-        others = [thing.parent]
+        others = [thing.parent, *(m.mirror_object for m in thing.modifiers if m.type == "MIRROR")]
         for constraint in [*thing.constraints, *(c for bone in bones for c in bone.constraints)]:
             others += [getattr(constraint, name, None) for name in ("target", "pole_target")]
             others += [target.target for target in getattr(constraint, "targets", ())]

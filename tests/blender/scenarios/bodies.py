@@ -3,6 +3,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import bmesh
 import bpy
@@ -57,6 +58,38 @@ def body_as_drawn(_folder: Path) -> None:
     assert _same(rig, body) == 2 * half
     mirror.mirror_object.scale = (1, 1, 0)
     refused(bpy.ops.neuralocks.sample_motion, "'Mirror' mirrors it in 'Middle', and one of both has zero scale")
+
+
+def mirror_object_moved(_folder: Path) -> None:
+    """Moving the object in which a body is mirrored makes the motion out of date, and the next render samples it again."""
+    from dcc_addon import background, handlers
+
+    scene, rig = bpy.context.scene, scenes.armature()
+    scenes.dance(rig)
+    body, strands = scenes.body(rig), scenes.hair(rig, 4)
+    mirror, middle = body.modifiers.new("Mirror", "MIRROR"), bpy.data.objects.new("Middle", None)
+    scene.collection.objects.link(middle)
+    mirror.mirror_object, mirror.use_mirror_merge = middle, False
+    body.modifiers.move(1, 0)
+    bpy.context.view_layer.update()
+    make_live(rig, strands)
+    scene.frame_set(9)
+
+    def render():
+        handlers.before_render(scene)
+        handlers.after_render()
+        return session.rigs["Rig"]
+
+    before = render()
+    assert before is render()
+    bpy.context.view_layer.update()
+    with patch("dcc_addon.handlers.background.doubt", wraps=background.doubt) as doubted:
+        middle.location.x = 0.1
+        bpy.context.view_layer.update()
+    after = render()
+    assert doubted.called and before.stale and not after.stale
+    moved = after.character.body.points - before.character.body.points
+    assert np.isclose(np.abs(moved).max(), 0.2, atol=1e-5)
 
 
 def absolute_shape_keys(_folder: Path) -> None:
