@@ -19,7 +19,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 
 from .services.motion import Motion
-from .services.rig import RigArrays
+from .services.rig import BodyArrays, RigArrays
 
 if TYPE_CHECKING:
     from neuralocks_core.runtime import StrandModel
@@ -62,6 +62,8 @@ class SampledRig:
     """Joints below the head that carry hair objects, by name: the jaw of a beard. All others ride on the head."""
     carried: dict[int, Character] = field(default_factory=dict)
     """The character with each such joint, made once; see `carrying`."""
+    body_arrays: tuple[BodyArrays, ...] = ()
+    """The body meshes as they were read then: a mirror object may stand elsewhere beside the body in another frame."""
     bodies_off: tuple[str, ...] = ()
     """Notes on bodies that are drawn elsewhere than where hair is kept out of them; see `scene.body_drawn`."""
     leaps: tuple[str, ...] = ()

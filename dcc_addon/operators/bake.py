@@ -142,7 +142,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
             shot = shot_beside(out)
             begin, end = (0.5 + 0.5 * (number + done) / len(looks) for done in (0, 1))
             own = [named(name) for name in names]
-            prims = yield from write_shot(shot, named(character), scene, sampled, own, undrawn, begin)
+            prims = yield from write_shot(shot, named(character), sampled, own, undrawn, begin)
             job = Threaded(
                 lambda say, shot=shot, out=out, look=look: bake(
                     shot,

@@ -133,7 +133,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
             options |= wind._asdict()
         head, loop = sampled.character.skeleton.names[sampled.character.head], sampled.clip.loop
         with undone_on_failure(out, shot):
-            prims = yield from write_shot(shot, named(name), scene, sampled, [], share=0.5)
+            prims = yield from write_shot(shot, named(name), sampled, [], share=0.5)
             job = Threaded(
                 lambda say: bake_rig(shot, out, model, head=head, loop=loop, **options, progress=say),
                 "Baking the hair bones",

@@ -130,7 +130,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
         try:
             character = Path(folder.name) / "character.usdc"
             hairs = [target] if self.kind == "strands" else []
-            prims = yield from write_shot(character, armature, scene, sampled, hairs, share=1.0)
+            prims = yield from write_shot(character, armature, sampled, hairs, share=1.0)
             armature, target = named(name), named(wanted)
             out = _reserved(target.name_full)
             settings = {

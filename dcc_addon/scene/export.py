@@ -9,21 +9,19 @@ from ..services import names
 from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names, skin
 from ..services.threaded import Threaded
-from . import body as body_reader
 from . import curves
-from .carried import bodies_of
 
 BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
 """The USD basis of each strand type that is not straight lines."""
 
 
-def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=(), share: float = 0.0):
+def write_shot(path: Path, armature, sampled, hairs, undrawn=(), share: float = 0.0):
     """Steps (done, total, message) of writing the armature's motion, its body and hair at rest. What is in Blender is read before the
     first of them; a thread writes it, because a long shot takes seconds.
 
     Args:
         path: the USD file.
-        armature, scene: what to write.
+        armature: the character to write.
         sampled: its `SampledRig`.
         hairs: hair objects to write, carried by the armature.
         undrawn: names of those that are invisible in the file.
@@ -39,7 +37,7 @@ def write_shot(path: Path, armature, scene, sampled, hairs, undrawn=(), share: f
 
     motion, rig = sampled.motion, sampled.rig
     bind = np.linalg.inv(to_core(sampled.bind_metres)) @ sampled.character.skeleton.bind
-    labels, skins = names.unique([f"Hair_{h.name}" for h in hairs]), _skins(armature, scene, sampled)
+    labels, skins = names.unique([f"Hair_{h.name}" for h in hairs]), _skins(sampled)
     rest = bind.copy()
     for joint, parent in enumerate(rig.parents):
         if parent >= 0:
@@ -91,12 +89,11 @@ def _hair(hair, label: str, sampled, visible: bool):
     )
 
 
-def _skins(armature, scene, sampled) -> dict:
+def _skins(sampled) -> dict:
     """The bodies that were sampled, as `SkinArrays` by object name; shape names are unique among all of them."""
     from usd.assets.scene_writer import SkinArrays
 
-    bodies = [body for body in bodies_of(armature, scene) if body.name_full in sampled.motion.places]
-    arrays = [body_reader.read(body, armature) for body in bodies]
+    arrays = sampled.body_arrays
     labels, shape_labels = names.unique([f"Body_{a.name}" for a in arrays]), iter(shape_names(arrays))
     skins = {}
     for body, label in zip(arrays, labels, strict=True):

@@ -290,6 +290,7 @@ class _Recording:
             ),
             carriers=carriers,
             carried=carried,
+            body_arrays=tuple(body for body, _ in arrays),
             bodies_off=body_drawn.all_told(
                 armature, [body for body, _ in arrays], self._bodies_at, character, clip, self._unit
             ),

@@ -60,8 +60,10 @@ def body_as_drawn(_folder: Path) -> None:
     refused(bpy.ops.neuralocks.sample_motion, "'Mirror' mirrors it in 'Middle', and one of both has zero scale")
 
 
-def mirror_object_moved(_folder: Path) -> None:
-    """Moving the object in which a body is mirrored makes the motion out of date, and the next render samples it again."""
+def mirror_object_moved(folder: Path) -> None:
+    """Moving the object in which a body is mirrored makes the motion out of date, and the next render samples it again. A bake keeps
+    hair out of the same body as the live view if the character moves and that object does not.
+    """
     from dcc_addon import background, handlers
 
     scene, rig = bpy.context.scene, scenes.armature()
@@ -90,6 +92,9 @@ def mirror_object_moved(_folder: Path) -> None:
     assert doubted.called and before.stale and not after.stale
     moved = after.character.body.points - before.character.body.points
     assert np.isclose(np.abs(moved).max(), 0.2, atol=1e-5)
+    live = points_at(strands, 9)
+    assert bpy.ops.neuralocks.bake(filepath=str(folder / "out.usdc")) == {"FINISHED"}
+    assert apart(baked_points(folder / "out.usdc", "/Character/Hair_Hair", 9), live) < SAME
 
 
 def absolute_shape_keys(_folder: Path) -> None:
