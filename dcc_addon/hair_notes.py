@@ -7,6 +7,7 @@ from .renewed import NOTE
 from .scene import cached_strands, imported
 from .scene.attach import has_cache
 from .scene.muting import off_meanwhile
+from .scene.riding import on_hair_bone
 from .session import session
 
 
@@ -27,6 +28,8 @@ def hair_notes(hair) -> list[str]:
         found.append("Its strands were changed since the bake, so its cache is off; press Bake and Attach again")
     if off := off_meanwhile(hair):
         found.append(f"Off while Live, or the hair would move twice: {', '.join(off)}")
+    if not own.live and (problem := on_hair_bone(hair)):  # while it is live, that is an error
+        found.append(problem)
     if own.armature is not None and (doubt := imported.doubt(hair)):
         found.append(doubt)
     return found

@@ -24,6 +24,7 @@ from .scene.lookup import find, identity, in_scene
 from .scene.muting import mute_deformers, unmute_deformers
 from .scene.paths import check_found
 from .scene.placing import world
+from .scene.riding import on_hair_bone
 from .scene.sampling import shown_frame
 from .scene.watched import evaluated_for_itself
 from .scene.windows import drawing, layer_shown
@@ -73,6 +74,8 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
         _restore(hair)
         session.hairs.pop(hair.name_full, None)
         raise NeuralocksError(f"{hair.name_full}: the hair is being edited; Live resumes when you leave this mode")
+    if problem := on_hair_bone(hair):
+        raise NeuralocksError(problem)
     sampled = session.rigs.get(armature.name_full)
     if sampled is None:
         raise unsampled(armature.name_full)

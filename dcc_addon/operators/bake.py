@@ -20,6 +20,7 @@ from ..scene.export import write_shot
 from ..scene.lookup import named
 from ..scene.muting import on_top
 from ..scene.paths import absolute
+from ..scene.riding import on_hair_bone
 from ..scene.shown import in_renders
 from ..services.names import file_label
 from ..services.overwriting import check_ours, untaken
@@ -114,7 +115,11 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
         raise NeuralocksError(
             f"{armature.name_full}: no hair belongs to this character; attach a hair object in the panel"
         )
+    on_bones = [problem for hair in hairs if (problem := on_hair_bone(hair))]
+    if on_bones and attached:
+        raise NeuralocksError(on_bones[0])
     looks, notes = grouped(hairs, undrawn)
+    notes += on_bones
     notes += [f"{hair.name_full}: {doubt}" for hair in hairs if (doubt := imported.doubt(hair))]
     character, label, subframes = armature.name_full, file_label(armature.name), scene.neuralocks.subframes
     yield from loading("usd.baking.bake", "usd.assets.own_layers", "usd.assets.scene_writer")

@@ -136,10 +136,12 @@ def beside_others(armature) -> bool:
     return bool(tracks) and not any(track.is_solo for track in tracks)
 
 
-def as_before(armature) -> dict[str, dict[str, list]]:
-    """Channels of live or baked hair bones, by bone and name, as they are without the hair's motion."""
+def as_before(armature, playing: bool = False) -> dict[str, dict[str, list]]:
+    """Channels of live or baked hair bones, by bone and name, as they are without the hair's motion; with `playing`, only of those that
+    have that motion, because their track is not muted.
+    """
     kept = rotations.kept_in(armature.neuralocks_character.rig_kept)
-    for action in _actions(armature):  # Live over baked keys has stored what the keys write
+    for action in _actions(armature, playing):  # Live over baked keys has stored what the keys write
         kept |= rotations.kept_in(action.get(KEPT, ""))
     return {name: dict(zip(rotations.KEPT, values)) for name, values in kept.items()}
 
@@ -243,8 +245,9 @@ def _library(armature) -> str:
     return armature.override_library.reference.library.name
 
 
-def _actions(armature) -> list:
-    return [strip.action for track in _tracks(armature) for strip in track.strips if strip.action]
+def _actions(armature, playing: bool = False) -> list:
+    tracks = [track for track in _tracks(armature) if not (playing and track.mute)]
+    return [strip.action for track in tracks for strip in track.strips if strip.action]
 
 
 def _orphans(armature) -> list:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What hair objects ride on: the head, a joint below it such as a beard's jaw, or neither, if the object has its own keys. The
-latter is reported, since live hair and bakes stay on the head whatever such an object does.
+latter is reported, since live hair and bakes stay on the head whatever such an object does; so is a hair bone that is live or keyed.
 """
 
 from collections.abc import Callable
@@ -10,6 +10,8 @@ import numpy as np
 from ..services import following
 from ..services import rig as rig_service
 from . import curves
+from .actions import as_before
+from .binding import carrying_bone
 
 FAR = 0.01
 """Smaller distances are not reported [m]."""
@@ -61,6 +63,22 @@ def strays_told(
         joint = rig.parents[joint]
     said = {hair.name_full: _told(hair, places[hair.name_full], ways, metres) for hair in hairs}
     return {name: text for name, text in said.items() if text}
+
+
+def on_hair_bone(hair) -> str:
+    """Why strands cannot be shown, or played from a cache, on a hair bone that is live or has baked keys: Blender moves their object with
+    it, and they are sampled without that motion. Empty if their object is not on one.
+    """
+    armature = hair.neuralocks_hair.armature
+    bone = armature.data.bones.get(carrying_bone(hair, armature) or "") if armature is not None else None
+    turned = as_before(armature, playing=True) if bone is not None else {}
+    found = next((each.name for each in (bone, *bone.parent_recursive) if each.name in turned), "") if turned else ""
+    if not found:
+        return ""
+    return (
+        f"{hair.name_full}: its object moves with hair bone '{found}', which is live or has baked keys, and strands do not follow the "
+        "motion of hair bones; make it a child of the head bone"
+    )
 
 
 def _told(hair, places: np.ndarray, ways: list[np.ndarray], metres: float) -> str:

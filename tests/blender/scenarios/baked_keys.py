@@ -20,6 +20,7 @@ from tests.blender.checks import (
     needs_usd,
     points_at,
     refused,
+    told_by,
 )
 
 
@@ -207,6 +208,49 @@ def strands_beside_keyed_bones(folder: Path) -> None:
     as_baked()
     track.is_solo = False
     assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+
+
+def strands_on_a_hair_bone(folder: Path) -> None:
+    """Strands whose object moves with a hair bone, or with a child of one, are refused by Live and by caches while that bone is live or
+    its keys play, and a bake has a note: Blender would move them with the bone, and a bake does not.
+    """
+    from dcc_addon.hair_notes import hair_notes
+
+    needs_usd()
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    strands, own = scenes.hair(rig, 20), rig.neuralocks_character
+    strands.parent_type, strands.parent_bone = "BONE", "hair.02"
+    bpy.context.view_layer.update()
+    strands.matrix_world = scenes.translation((0, 0, 0))
+    give_bone_model(rig, folder)
+    make_live(rig, strands)
+    bpy.context.scene.neuralocks.output = str(folder / "out.usdc")
+    expected, out, why = points_at(strands, 9), folder / "out.usdc", "moves with hair bone 'hair.01'"
+
+    def alike() -> None:
+        assert apart(points_at(strands, 9), expected) < SAME and not messages(), messages()
+
+    def at_odds() -> None:
+        points_at(strands, 8)
+        points_at(strands, 9)
+        assert why in messages()["Hair"] and "child of the head bone" in messages()["Hair"], messages()
+        refused(bpy.ops.neuralocks.bake_attach, why)
+        assert [line for line in told_by(bpy.ops.neuralocks.bake) if why in line]
+        assert apart(baked_points(out, "/Character/Hair_Hair", 9), expected) < SAME
+
+    alike()
+    own.rig_live = True
+    at_odds()
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    at_odds()
+    track = rig.animation_data.nla_tracks["Neuralocks Hair"]
+    track.mute = True
+    alike()
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}
+    assert apart(points_at(strands, 9), expected) < SAME and not [note for note in hair_notes(strands) if why in note]
+    track.mute = False
+    assert [note for note in hair_notes(strands) if why in note]
 
 
 def tracks_deleted_by_hand(folder: Path) -> None:
