@@ -191,8 +191,7 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
         armature = shown_armature(context)
         path = self.filepath or context.scene.neuralocks.output
         hairs = hairs_of(armature, context.scene)
-        drawn = in_renders(context.scene)
-        undrawn = [hair.name_full for hair in hairs if hair not in drawn]
+        undrawn = [hair.name_full for hair in hairs if not in_renders(hair, context.scene)]
         baked, notes, _ = yield from bake_steps(context, armature, hairs, path, undrawn)
         left = dict.fromkeys(f"'{modifier}'" for name in baked for modifier in on_top(named(name)))
         more = f"; not in the file: modifiers {', '.join(left)} (Bake and Attach plays below them)" if left else ""

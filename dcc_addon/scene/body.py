@@ -28,8 +28,8 @@ def find(armature, scene) -> list:
     """The meshes that this armature deforms and that a render of the scene draws in any frame, by name; without those whose faces
     only come from modifiers.
     """
-    meshes = [o for o in in_renders(scene) if o.type == "MESH" and len(o.data.polygons)]
-    return sorted((o for o in meshes if deformed(o, armature)), key=lambda o: o.name_full)
+    meshes = [o for o in scene.objects if o.type == "MESH" and deformed(o, armature)]  # of thousands of objects, a few
+    return sorted((o for o in meshes if len(o.data.polygons) and in_renders(o, scene)), key=lambda o: o.name_full)
 
 
 def read(mesh_object, armature) -> BodyArrays:

@@ -15,16 +15,19 @@ def enabled(thing, layer, mode: str = "VIEWPORT") -> bool:
     if mode == "VIEWPORT" and thing.visible_get(view_layer=layer):
         return True
     off = "hide_render" if mode == "RENDER" else "hide_viewport"
+    return not getattr(thing, off) and _linked(thing, [layer], off)
+
+
+def in_renders(thing, scene) -> bool:
+    """Whether a render of the scene draws an object in any frame; of a scene of which nothing is rendered, if that would be on."""
+    layers = [layer for layer in scene.view_layers if layer.use] or scene.view_layers
+    drawn = not thing.hide_render or "hide_render" in animated(thing.animation_data)
+    return drawn and _linked(thing, layers, "hide_render")
+
+
+def _linked(thing, layers, off: str) -> bool:
     held = set(thing.users_collection)
-    return not getattr(thing, off) and any(each in held for each in _included(layer.layer_collection, off))
-
-
-def in_renders(scene) -> set:
-    """Objects that a render of the scene draws in any frame. All at once, because it takes as long to find the collections of one."""
-    roots = (layer.layer_collection for layer in scene.view_layers if layer.use)
-    drawn = {each for root in roots for each in _included(root, "hide_render")}
-    of = (thing for each in drawn for thing in each.objects)
-    return {thing for thing in of if not thing.hide_render or "hide_render" in animated(thing.animation_data)}
+    return any(each in held for layer in layers for each in _included(layer.layer_collection, off))
 
 
 def _included(branch, off: str) -> Iterator:
