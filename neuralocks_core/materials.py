@@ -94,6 +94,8 @@ class Material:
         """
         given: dict[str, float] = {}
         for setting in settings:
+            if not isinstance(setting, str):
+                raise NeuralocksError(f"material {setting!r}: is not a word; write NAME=VALUE, for example 'bend=1.5x'")
             said, _, text = (part.strip() for part in setting.partition("="))
             name = ALIASES.get(said, said)
             if name not in RANGES:

@@ -41,6 +41,11 @@ def test_several_in_one_word_are_told_apart(setting):
         Material.parse([setting])
 
 
+def test_what_is_no_word_is_refused():
+    with pytest.raises(NeuralocksError, match="material 1: is not a word; write NAME=VALUE"):
+        Material.parse([1])
+
+
 @pytest.mark.parametrize("settings", [["weight=1.5", "weight=2"], ["stiffness=2x", "bend=0.002"]])
 def test_a_constant_is_given_once(settings):
     with pytest.raises(NeuralocksError, match=f"material '{settings[1]}': (weight|bend) is given twice"):

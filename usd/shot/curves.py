@@ -134,7 +134,7 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
         counts=counts,
         widths=_widths(curves, counts, scale, notes),
         root_uv=None if uv is None else uv.astype(np.float32),
-        guides=None if guides is None else guides.astype(bool),
+        guides=None if guides is None else guides > 0.5,
         group=None if group is None else group.astype(np.int32),
     )
 

@@ -92,6 +92,9 @@ def mirror_object_moved(folder: Path) -> None:
     assert doubted.called and before.stale and not after.stale
     moved = after.character.body.points - before.character.body.points
     assert np.isclose(np.abs(moved).max(), 0.2, atol=1e-5)
+    mirror.use_axis = False, True, False
+    bpy.context.view_layer.update()
+    assert render() is not after and after.stale
     live = points_at(strands, 9)
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "out.usdc")) == {"FINISHED"}
     assert apart(baked_points(folder / "out.usdc", "/Character/Hair_Hair", 9), live) < SAME
