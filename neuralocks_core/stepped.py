@@ -43,12 +43,11 @@ class Stepped:
 
         Args:
             clip: without cuts.
-            joints: those whose motion the hair reads.
+            joints: those whose motion the hair reads, the chest second, as `joints_read` gives them.
         """
-        whole, bent = _changes(clip.joints, joints)
-        ends, count = _held(clip.times, whole)
+        ends, count = _held(clip.times, _changes(clip.joints, joints))
         if not len(count):  # a vehicle, or a root that is animated on ones, may carry a body on twos
-            ends, count = _held(clip.times, bent)
+            ends, count = _held(clip.times, _changes(clip.joints, joints, from_chest=True))
         if not len(count):
             return cls(clip, count, clip, clip.times)
         shown = np.arange(len(clip.times))  # per sample, the one whose pose it holds
@@ -68,26 +67,20 @@ class Stepped:
         return np.interp(base, self._whole.times, self._first) + (times - base)
 
 
-def _changes(joints: np.ndarray, read: list[int]) -> tuple[np.ndarray, np.ndarray]:
+def _changes(joints: np.ndarray, read: list[int], from_chest: bool = False) -> np.ndarray:
     """How much the joints that are read change from each sample to the next (T - 1,), in units of what rounding may cause: in the
-    world, and as seen from the second of them, the chest.
+    world, or as seen from the second of them.
     """
-    own = joints[:, list(dict.fromkeys(read)), :3]
-    chest = joints[:, read[min(1, len(read) - 1)], :3]
-    turns, places = own[..., :3], own[..., 3]
-    back = chest[:, None, :, :3].swapaxes(-1, -2)  # a transpose: whatever the scale, it is the same for the same pose
-    seen = back @ turns, (back @ (places - chest[:, None, :, 3])[..., None])[..., 0]
-    sizes = [max(2.0, np.abs(each).max(initial=0)) for each in (turns, places)]
-    found = []
-    for parts in ((turns, places), seen):
-        change = np.zeros(len(joints) - 1)
-        for part, size in zip(
-            parts, sizes, strict=True
-        ):  # far from the origin places are rounded more, but turns are not
-            moved = np.abs(np.diff(part, axis=0)).max(axis=tuple(range(1, part.ndim)), initial=0)
-            np.maximum(change, moved / (ROUNDING * size), out=change)
-        found.append(change)
-    return found[0], found[1]
+    own, chest = joints[:, list(dict.fromkeys(read)), :3], joints[:, read[:2][-1], None, :3]
+    changes = []
+    for part in (slice(3), slice(3, 4)):  # far from the origin places are rounded more, but turns are not
+        seen, size = own[..., part], max(2.0, np.abs(own[..., part]).max())
+        if from_chest:
+            away = chest[..., 3:] if part.stop == 4 else 0.0
+            # A transpose serves as the inverse: whatever the scale, equal poses stay equal.
+            seen = chest[..., :3].swapaxes(-1, -2) @ (seen - away)
+        changes.append(np.abs(np.diff(seen, axis=0)).max(axis=(1, 2, 3)) / (ROUNDING * size))
+    return np.maximum(*changes)
 
 
 def _held(times: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
 from ..shot.also_changed import also_changed
+from ..shot.curves import find_curves
 from ..shot.notes import asked_notes, out_of_place
 from ..shot.stage import Shot, check_frames_named, read_shot
 from .samples import write_samples
@@ -45,7 +46,7 @@ def read_asked(
     if not isinstance(shot, Shot):
         shot = read_shot(shot, grooms, skeleton, head, joints, cuts, still=wind is not None)
     check_frames_named(shot.path, frames, shot.first, shot.last, shot.rigs)
-    samples = [code for rig in shot.rigs for code in rig.source.samples]
+    samples = [code for rig in shot.rigs for code in rig.source.keys.every]
     return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame, samples)
 
 
@@ -56,7 +57,7 @@ def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[
         *asked_notes(shot.stage, shot.rigs, codes, loop),
         *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
         *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
-        *also_changed(shot.stage, (item.prim for item in shot.grooms)),
+        *also_changed((item.prim for item in shot.grooms), find_curves(shot.stage)),
     ]
 
 

@@ -102,6 +102,8 @@ def check_not_input(out: Path, stage: Usd.Stage) -> None:
     """
     if any(one_file(out, path) for path in used_files(stage)):
         raise NeuralocksError(f"{out}: is read as well, as a file or a layer of it; choose another name")
+    if not os.path.exists(out):  # a large layer takes half a second to tell what it refers to
+        return
     for layer in stage.GetUsedLayers():
         for asset in layer.GetCompositionAssetDependencies():
             if one_file(out, layer.ComputeAbsolutePath(asset)):

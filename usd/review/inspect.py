@@ -131,7 +131,7 @@ def _rig(rig: StageRig) -> dict:
         "animated": rig.source.animated,
         "animation": None if rig.source.animation is None else str(rig.source.animation.GetPath()),
         "moved by a rig bake": is_baked(rig),
-        "samples": len(rig.source.samples),
+        "samples": len(rig.source.keys.every),
         "head": found.get("head"),
         "head found by": humanoid.reasons.get("head"),
         "head width [m]": None if width is None else round(width, 3),

@@ -24,6 +24,7 @@ from ..shot.also_changed import also_changed
 from ..shot.notes import asked_notes, left_out, out_of_place, without_strength
 from ..shot.stage import check_cuts
 from ..shot.wind import as_wind, in_core, wind_facts
+from ..skel.source import find_skeletons
 from .bound import BoundHair
 from .layer import MovedHair, write_rig_layer
 from .stage import of_skeleton, read_rigged_hairs
@@ -139,7 +140,7 @@ def bake_rig(
     facts = {"strength": float(strength), "loop": loop, **wind_facts(blown)}
     animations = write_rig_layer(written, shot, out, facts)
     late = [text for text in dict.fromkeys([*map(left_out, still), *said]) if text not in notes]
-    late += also_changed(stage, (one.hair.source.source.prim for one in written))
+    late += also_changed((one.hair.source.source.prim for one in written), find_skeletons(stage))
     late += out_of_place(stage, out)
     if tell:
         tell(late)

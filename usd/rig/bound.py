@@ -64,7 +64,7 @@ class BoundHair:
         first, last = frame_range(hair.stage, [hair.source])
         if windy:
             check_frames_named(hair.path, frames, first, last, [hair.source])
-        wanted = time_codes(frames, first, last, subframes, hair.border.frame, hair.source.source.samples)
+        wanted = time_codes(frames, first, last, subframes, hair.border.frame, hair.source.source.keys.every)
         return cls(hair, model, size, trained_name, wanted, _with_samples(hair, wanted))
 
     @property

@@ -8,29 +8,26 @@ from collections.abc import Iterable, Iterator
 from pxr import Sdf, Usd
 
 
-def also_changed(stage: Usd.Stage, prims: Iterable[Usd.Prim]) -> list[str]:
-    """The notes on prims of the same type as one of these, and not among them, that take over what a layer says of it.
+def also_changed(prims: Iterable[Usd.Prim], every: Iterable[Usd.Prim]) -> list[str]:
+    """The notes on prims that take over what a layer says of another one.
 
     Args:
-        stage: the shot.
         prims: those that the layer is to override.
+        every: all prims of the shot that are to be told of, these among them.
     """
-    prims = list(prims)
-    paths, kinds = {prim.GetPath() for prim in prims}, {prim.GetTypeName() for prim in prims}
-    notes = []
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
-        if prim.GetTypeName() in kinds and prim.GetPath() not in paths:
-            source = next((path for path in _composed_of(prim, stage.GetRootLayer()) if path in paths), None)
-            if source:
-                notes.append(
-                    f"{prim.GetPath()}: references or inherits {source} in this shot, so it changes as that is baked; bake both, "
-                    "or make it a copy of its own"
-                )
+    paths, notes = {prim.GetPath() for prim in prims}, []
+    for prim in every:
+        if prim.GetPath() not in paths and (source := next((p for p in _composed_of(prim) if p in paths), None)):
+            notes.append(
+                f"{prim.GetPath()}: references or inherits {source} in this shot, so it changes as that is baked; bake both, or "
+                "make it a copy of its own"
+            )
     return notes
 
 
-def _composed_of(prim: Usd.Prim, root: Sdf.Layer) -> Iterator[Sdf.Path]:
+def _composed_of(prim: Usd.Prim) -> Iterator[Sdf.Path]:
     """The prims of the root layer and its sublayers that a prim is composed of."""
+    root = prim.GetStage().GetRootLayer()
     while prim.IsInstanceProxy():
         prim = prim.GetPrimInPrototype()
     waiting = [prim.GetPrimIndex().rootNode]

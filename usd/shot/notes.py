@@ -241,7 +241,7 @@ def partial_body(rig: StageRig, left: Sequence[str]) -> list[str]:
 
 def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
     """The note on a range of time codes that the animation mostly does not cover, so that the character stands still."""
-    samples = rig.source.samples
+    samples = rig.source.keys.every
     if len(samples) < 2:
         return []
     within = min(samples[-1], last) - max(samples[0], first)

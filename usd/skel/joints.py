@@ -81,14 +81,9 @@ class JointSource:
         return Keys.of(joints, [(self.placement.samples, self.placement.at)], face)
 
     @property
-    def samples(self) -> list[float]:
-        """All of these time codes, ascending."""
-        return self.keys.every
-
-    @property
     def animated(self) -> bool:
         """Whether a SkelAnimation, of joints or of a face alone, or a parent's transform drives it."""
-        return self._columns is not None or bool(self.samples)
+        return self._columns is not None or bool(self.keys.every)
 
     @property
     def moves_joints(self) -> bool:

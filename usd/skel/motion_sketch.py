@@ -24,7 +24,7 @@ def motion_sketch(source: JointSource, rate: float) -> str:
 
 
 def _blocks(source: JointSource, rate: float) -> Iterator[np.ndarray]:
-    codes, moves, names = source.samples, bool(source.placement.samples), source.shape_names
+    codes, moves, names = source.keys.every, bool(source.placement.samples), source.shape_names
     yield source.bind
     yield np.array(codes) / rate
     back = np.linalg.inv(source.placement.reference)
