@@ -5,9 +5,12 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.runtime import StrandModel
 
 
 @pytest.mark.parametrize(
@@ -33,3 +36,30 @@ def test_other_errors_keep_their_traceback(monkeypatch, capsys):
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
     import_module("plain_errors").told(ModuleNotFoundError, ModuleNotFoundError("no numpy", name="numpy"), None)
     assert "ModuleNotFoundError: no numpy" in capsys.readouterr().err
+
+
+def test_a_livelier_model_feels_the_head_accelerate_by_so_many_times_and_holds_poses_as_before(monkeypatch, tmp_path):
+    pytest.importorskip("torch", reason="the extra 'train' is not installed")
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "benchmarks")
+    shipped = model.shipped()
+    livelier = import_module("livelier").livelier(shipped, 1.5, tmp_path / "livelier.neuralocks")
+    before, after = (StrandModel.load(path) for path in (shipped, livelier))
+    spec = before.spec
+    random = np.random.default_rng(0)
+    vector = random.normal(0, 0.1, spec.size).astype(np.float32)
+    vector[spec.slices["history"]] = 0
+    assert_close(after.frame(vector), before.frame(vector))
+    pushed, spun = vector.copy(), vector.copy()
+    history = random.normal(0, 0.1, (len(spec.bins), spec.per_bin)).astype(np.float32)
+    spun[spec.slices["history"]] = np.where(np.arange(spec.per_bin) < 3, 0, history).ravel()
+    assert_close(after.frame(spun), before.frame(spun))
+    pushed[spec.slices["history"]] = history.ravel()
+    more = pushed.copy()
+    more[spec.slices["history"]] = np.where(np.arange(spec.per_bin) < 3, 1.5 * history, history).ravel()
+    assert_close(after.frame(pushed), before.frame(more))
+    assert model.read(livelier).meta["training"]["livelier"] == "acceleration of the head, times 1.5"
+
+
+def assert_close(one: dict, other: dict) -> None:
+    for name, array in one.items():
+        np.testing.assert_allclose(array, other[name], atol=2e-3 * np.abs(other[name]).max())

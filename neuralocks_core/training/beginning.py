@@ -48,7 +48,7 @@ class Beginning:
         training = self._meta["training"]
         return {
             name: training[name]
-            for name in ("command", "minutes", "steps", "mean", "began", "began with")
+            for name in ("command", "minutes", "steps", "mean", "livelier", "began", "began with")
             if name in training
         }
 

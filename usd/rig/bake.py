@@ -134,7 +134,7 @@ def bake_rig(
     def moved(one: BoundHair) -> MovedHair:
         turns, held = one.turns(loop, strength, in_core(blown, one.hair.border), counter)
         said.extend(held + one.hair.source.notes)  # also on poses between those of the clip
-        return MovedHair(one.hair, one.codes, turns)
+        return MovedHair(one.hair, one.codes, turns, one.outdated)
 
     written = _each(bound, moved, still)
     facts = {"strength": float(strength), "loop": loop, **wind_facts(blown)}

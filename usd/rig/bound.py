@@ -17,6 +17,8 @@ from ..border.time_codes import time_codes
 from ..shot.character_notes import lies_down
 from ..shot.notes import not_animated, on_twos, without_turn
 from ..shot.stage import check_frames_named, frame_range
+from ..skel.old_copy import is_outdated, outdated_note
+from ..skel.rig_copy import outdated_of
 from .layer import kept_hair
 from .notes import mirrored_notes, rigged_notes
 from .stage import RiggedHair
@@ -36,6 +38,7 @@ class BoundHair:
         trained_name: what the model calls its first joint.
         wanted: the time codes that were asked for, see `time_codes.time_codes`.
         codes: `wanted` and the animation's own samples, because the body must come out sample for sample.
+        outdated: joints of other hair that an earlier bake moves, as the animation was then.
     """
 
     hair: RiggedHair
@@ -44,6 +47,7 @@ class BoundHair:
     trained_name: str
     wanted: list[float]
     codes: list[float]
+    outdated: list[str]
 
     @classmethod
     def of(cls, hair: RiggedHair, model: RigModel, frames, subframes: int, windy: bool) -> "BoundHair":
@@ -65,7 +69,7 @@ class BoundHair:
         if windy:
             check_frames_named(hair.path, frames, first, last, [hair.source])
         wanted = time_codes(frames, first, last, subframes, hair.border.frame, hair.source.source.keys.every)
-        return cls(hair, model, size, trained_name, wanted, _with_samples(hair, wanted))
+        return cls(hair, model, size, trained_name, wanted, _with_samples(hair, wanted), _outdated(hair))
 
     @property
     def path(self) -> str:
@@ -112,6 +116,7 @@ class BoundHair:
             *self._resized(),
             *rigged_notes(rig, read),
             *_name_notes(rig.source),
+            *([outdated_note(rig.source, self.outdated)] if self.outdated else []),
             *mirrored_notes(rig, self.hair.rig.chains),
             *(rig.loop_notes(self.wanted, self.joints) if loop else []),
             *(on_twos(rig, read) if self.model.dynamic else []),
@@ -177,6 +182,16 @@ def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:
     after = np.searchsorted(edges, wanted)
     near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= 1e-6 * hair.border.frame
     return sorted({*np.array(wanted)[~near].tolist(), *own})
+
+
+def _outdated(hair: RiggedHair) -> list[str]:
+    """Joints of other hair that an earlier bake moves as the animation was then."""
+    source = hair.source.source
+    kept = kept_hair(source, hair.rig.chains.joints)
+    if kept and not is_outdated(source, hair.source.time_codes):
+        former = outdated_of(source.copied)
+        return [name for name in kept if name in former]
+    return list(kept)
 
 
 def _name_notes(source) -> list[str]:

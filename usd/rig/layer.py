@@ -30,11 +30,13 @@ class MovedHair:
         hair: the character as read.
         codes: ascending time codes of the rotations, (T,).
         turns: of the hair joints in their own bind axes as authored, (T, N, 4) wxyz.
+        outdated: joints of other hair that an earlier bake moves, as the animation was then.
     """
 
     hair: RiggedHair
     codes: list[float]
     turns: np.ndarray
+    outdated: list[str]
 
     @property
     def joints(self) -> np.ndarray:
@@ -105,7 +107,8 @@ def _write_animation(layer: Sdf.Layer, character: MovedHair) -> str:
         layer.SetTimeSample(spec.path, float(code), Vt.QuatfArray(values))
     if source.animation is not None:
         _blend_shapes(layer, prim, UsdSkel.Animation(source.animation))
-        tell_source(prim, source.animation, [*moved, *kept])
+        tell_source(prim, source.animation, [*moved, *kept], character.outdated)
+    _hide_former(prim, source.prim.GetStage().GetPrimAtPath(prim.path))
     return str(prim.path)
 
 
@@ -126,6 +129,22 @@ def _animation_spec(layer: Sdf.Layer, hair: RiggedHair) -> Sdf.PrimSpec:
     relation = Sdf.RelationshipSpec(over, "skel:animationSource", custom=False)
     relation.targetPathList.explicitItems = [over.path.AppendChild(BAKED)]
     return Sdf.PrimSpec(over, BAKED, Sdf.SpecifierDef, "SkelAnimation")
+
+
+def _hide_former(prim: Sdf.PrimSpec, former: Usd.Prim) -> None:
+    """Let nothing of an earlier bake at the same path, which may be switched off, show through: its blend shapes, say."""
+    if not former:
+        return
+    if not former.IsActive():
+        prim.active = True
+    for name in ("rotations", "blendShapes", "blendShapeWeights"):
+        attribute, spec = former.GetAttribute(name), prim.attributes.get(name)
+        if not attribute.HasAuthoredValue():
+            continue
+        if spec is None:
+            spec = Sdf.AttributeSpec(prim, name, attribute.GetTypeName(), attribute.GetVariability())
+        if not spec.HasInfo("default") and (_has_default(attribute) or not spec.HasInfo("timeSamples")):
+            spec.default = Sdf.ValueBlock()
 
 
 def _usable_animation(source: JointSource) -> UsdSkel.Animation | None:

@@ -10,14 +10,19 @@ SOURCE = "neuralocks:animation"
 """A relationship to the animation that was copied."""
 HAIR = "neuralocks:joints"
 """The joints whose rotations are not from that animation."""
+OUTDATED = "neuralocks:outdated"
+"""Those of them whose rotations were made when it was another."""
 
 
-def tell_source(copy: Sdf.PrimSpec, source: Usd.Prim, hair: list[str]) -> None:
-    """Write on a copy what it was made from, and its hair joints; nothing if it was made from itself."""
+def tell_source(copy: Sdf.PrimSpec, source: Usd.Prim, hair: list[str], outdated: list[str]) -> None:
+    """Write on a copy what it was made from, its hair joints, and which of these are of an earlier state of that; nothing if it was
+    made from itself.
+    """
     if copy.path != source.GetPath():
         Sdf.RelationshipSpec(copy, SOURCE, custom=True).targetPathList.explicitItems = [source.GetPath()]
-        spec = Sdf.AttributeSpec(copy, HAIR, Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
-        spec.default, spec.custom = Vt.TokenArray(hair), True
+        for name, joints in ((HAIR, hair), (OUTDATED, outdated)):
+            spec = Sdf.AttributeSpec(copy, name, Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
+            spec.default, spec.custom = Vt.TokenArray(joints), True
 
 
 def source_of(animation: Usd.Prim) -> Usd.Prim | None:
@@ -34,7 +39,16 @@ def source_of(animation: Usd.Prim) -> Usd.Prim | None:
 
 def hair_of(copy: Usd.Prim) -> tuple[str, ...]:
     """The hair joints of a copy, if it records them."""
-    attribute = copy.GetAttribute(HAIR)
+    return _listed(copy, HAIR)
+
+
+def outdated_of(copy: Usd.Prim) -> tuple[str, ...]:
+    """The hair joints of a copy that were made from an earlier state of its source."""
+    return _listed(copy, OUTDATED)
+
+
+def _listed(copy: Usd.Prim, name: str) -> tuple[str, ...]:
+    attribute = copy.GetAttribute(name)
     return as_names(attribute, attribute.Get()) if attribute else ()
 
 

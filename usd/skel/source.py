@@ -20,12 +20,9 @@ from .blend_shapes import all_shares, knot_weights
 from .clip_codes import clip_codes
 from .cut_samples import cut_samples
 from .joints import JointSource
-from .rig_copy import alike, hair_of, source_of
+from .old_copy import copy_notes
 from .stage_rig import StageRig, joint_trim
 from .surface import Skins, bound_meshes, find_skins, merged_body, moved_joints, not_posed, seen_in_turn
-
-COMPARED = 100
-"""About this many poses of a rig bake are compared with those that it was made from."""
 
 
 def read_rig(
@@ -62,7 +59,7 @@ def read_rig(
     source = JointSource(prim, unbaked)
     notes = source.notes
     time_codes = clip_codes(source, border)
-    notes += _old_copy(source, time_codes)
+    notes += copy_notes(source, time_codes)
     posed = source.posed(time_codes)
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
     notes += not_posed(meshes, source) + seen_in_turn(meshes)
@@ -113,27 +110,6 @@ def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
     """Skeleton prims in stage order."""
     every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
     return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
-
-
-def _old_copy(source: JointSource, time_codes: np.ndarray) -> list[str]:
-    """The note on a rig bake whose body does not move like the animation that it was made from."""
-    copy = source.copied or source.animation
-    original = copy and source_of(copy)
-    if not original:
-        return []
-    codes, hair = time_codes[:: max(1, len(time_codes) // COMPARED)], hair_of(copy)
-    body = [joint for joint, name in enumerate(source.names) if name not in hair]
-    try:
-        both = [JointSource(source.prim, unbaked) for unbaked in (False, True)]
-        same = alike(*(each.local(codes)[:, body] for each in both))
-        if same and np.allclose(*(each.shape(both[1].shape_names, codes) for each in both), atol=1e-4):
-            return []
-    except NeuralocksError:  # reported when one is read
-        return []
-    fact = (
-        f"{source.path}: its animation {copy.GetName()} is a rig bake of {original.GetPath()}, which has changed since"
-    )
-    return [f"{fact}; {'what that shows is read' if source.copied else 'bake the rig again'}"]
 
 
 def _humanoid(source: JointSource, by_hand: dict[str, str], skinned: np.ndarray) -> Humanoid:

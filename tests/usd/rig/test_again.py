@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd
+from pxr import Gf, Sdf, Usd, UsdSkel
 
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
@@ -37,6 +37,15 @@ def _rotations(path, prim="/Who/Rig") -> list:
     stage = Usd.Stage.Open(str(path))
     attribute = stage.GetPrimAtPath(f"{prim}/{BAKED}").GetAttribute("rotations")
     return [list(attribute.Get(code)) for code in attribute.GetTimeSamples()]
+
+
+def _pose(path, codes) -> np.ndarray:
+    """Joint transforms (T, J, 4, 4) as UsdSkel shows them."""
+    stage = Usd.Stage.Open(str(path))
+    cache = UsdSkel.Cache()
+    cache.Populate(UsdSkel.Root(stage.GetPrimAtPath("/Who")), Usd.PrimDefaultPredicate)
+    query = cache.GetSkelQuery(UsdSkel.Skeleton(stage.GetPrimAtPath("/Who/Rig")))
+    return np.array([query.ComputeJointSkelTransforms(float(code)) for code in codes])
 
 
 def test_an_updated_animation_reaches_a_bake_over_an_old_one(folder):
@@ -101,9 +110,63 @@ def test_a_bake_of_other_hair_keeps_that_of_the_one_before(folder):
     assert {name.rsplit("/", 1)[1] for name in baked.GetAttribute(HAIR).Get()} == {"hair_0", "hair_1", "hair_2"}
 
 
+def test_hair_that_stays_as_the_animation_was_is_named_until_it_is_baked_again(folder):
+    first, second = (model_for(read_rigged_hair(folder / "shot.usda", chains=[name])) for name in ("hair_0", "hair_1"))
+    bake_rig(folder / "shot.usda", folder / "hair.usda", first)
+    told = "/Who/Rig: 'hair_0' keeps the motion of an earlier animation"
+
+    def notes_of(shot, out, model):
+        return [note for note in bake_rig(folder / f"{shot}.usda", folder / f"{out}.usda", model).notes if told in note]
+
+    def inspected(name):
+        return [note for note in inspect(folder / f"{name}.usda")["spoils"] if told in note]
+
+    assert not notes_of("hair", "both", second) and not inspected("both")
+    assert len(notes_of("on_hair", "mixed", second)) == len(inspected("mixed")) == 1
+    assert len(notes_of("mixed", "mixed_again", second)) == len(inspected("mixed_again")) == 1
+    assert not notes_of("mixed", "fresh", first) and not inspected("fresh")
+
+
 def test_a_copy_whose_source_is_gone_is_read_itself(folder):
     layer = Usd.Stage.Open(str(folder / "hair.usda")).Flatten()
     del layer.GetPrimAtPath("/Who").nameChildren["Motion"]
     layer.Export(str(folder / "alone.usda"))
     bake_rig(folder / "alone.usda", folder / "again.usda", model_for(read_rigged_hair(folder / "shot.usda")))
     assert _rotations(folder / "again.usda") == _rotations(folder / "hair.usda")
+
+
+def test_a_bake_over_one_that_was_switched_off_moves(folder):
+    stage = Usd.Stage.Open(str(folder / "hair.usda"))
+    stage.GetPrimAtPath(f"/Who/Rig/{BAKED}").SetActive(False)
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Rig")).GetAnimationSourceRel().SetTargets(["/Who/Motion"])
+    stage.Save()
+    model = model_for(read_rigged_hair(folder / "shot.usda"))
+    for below in ("hair", "shot"):
+        bake_rig(folder / f"{below}.usda", folder / f"over_{below}.usda", model)
+    codes = np.arange(1, 26)
+    one, other = (_pose(folder / f"over_{below}.usda", codes) for below in ("hair", "shot"))
+    np.testing.assert_array_equal(one, other)
+    assert not np.array_equal(one[0], one[8])
+
+
+@pytest.mark.parametrize("authored", [["blendShapes", "blendShapeWeights"], ["blendShapeWeights"]])
+def test_the_face_of_an_earlier_bake_does_not_show_through(folder, authored):
+    """The clip had a face when the hair was baked first, and has none, or no weights, now."""
+    stage = Usd.Stage.Open(str(folder / "shot.usda"))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion"))
+    motion.CreateBlendShapesAttr(["smile"])
+    motion.CreateBlendShapeWeightsAttr().Set([0.9], 3)
+    stage.Save()
+    model = model_for(read_rigged_hair(folder / "shot.usda"))
+    bake_rig(folder / "shot.usda", folder / "hair.usda", model)
+    for name in authored:
+        motion.GetPrim().RemoveProperty(name)
+    stage.Save()
+    for below in ("hair", "shot"):
+        bake_rig(folder / f"{below}.usda", folder / f"over_{below}.usda", model)
+    shown = []
+    for below in ("hair", "shot"):
+        over = Usd.Stage.Open(str(folder / f"over_{below}.usda"))
+        baked = UsdSkel.Animation(over.GetPrimAtPath(f"/Who/Rig/{BAKED}"))
+        shown.append((baked.GetBlendShapesAttr().Get(), baked.GetBlendShapeWeightsAttr().Get(3)))
+    assert shown[0] == shown[1] == ((None if len(authored) == 2 else ["smile"]), None)

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A strand model that feels how the head is accelerated, and wind, by so many times: a network that is not sure outputs the mean
+of what is possible, which moves less than hair does.
+
+    python benchmarks/livelier.py MODEL TIMES -o OUT
+
+Held poses stay as they are. The card says so, without the measurements of MODEL.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import plain_errors  # noqa: F401
+import torch
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("model", type=Path)
+    parser.add_argument("times", type=float)
+    parser.add_argument("-o", "--out", type=Path, required=True)
+    print(livelier(**vars(parser.parse_args())))
+
+
+def livelier(model: Path, times: float, out: Path) -> Path:
+    """Write the model with `times` the weight of effective gravity's changes in its history."""
+    from neuralocks_core import model as model_file
+    from neuralocks_core.boundary_spec import BoundarySpec
+    from neuralocks_core.training.beginning import Beginning
+    from neuralocks_core.training.export import strand_graphs
+    from neuralocks_core.training.networks import StrandNet
+
+    meta = model_file.read(model, "strands").meta
+    spec, training = BoundarySpec.from_json(meta["boundary"]), meta["training"]
+    net = StrandNet(spec.size, **{name: training["options"][name] for name in ("motion", "strand_map")})
+    beginning = Beginning(model)
+    beginning.fill(net)
+    history = spec.slices["history"]
+    with torch.no_grad():
+        for layer in (net.frame, *list(net.encoder or ())[:1]):
+            layer.weight[:, history].unflatten(1, (-1, spec.per_bin))[..., :3] *= times
+    training = {**training, "livelier": f"acceleration of the head, times {times:g}"}
+    graphs = strand_graphs(beginning.coder(), net, meta["output"])
+    return model_file.write(out, {**meta, "training": training, "report": {}}, graphs)
+
+
+if __name__ == "__main__":
+    main()
