@@ -12,7 +12,8 @@ from neuralocks_core.wind import Wind
 from ..border.time_codes import time_codes
 from ..shot.also_changed import also_changed
 from ..shot.curves import find_curves
-from ..shot.notes import asked_notes, out_of_place
+from ..shot.gaps import hidden
+from ..shot.notes import asked_notes, few, out_of_place
 from ..shot.stage import Shot, check_frames_named, read_shot
 from .samples import write_samples
 
@@ -57,6 +58,10 @@ def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[
         *asked_notes(shot.stage, shot.rigs, codes, loop),
         *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
         *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
+        *few(
+            [text for item in shot.grooms for text in hidden(item.prim, codes, shot.border.frame)],
+            "grooms are baked already",
+        ),
         *also_changed((item.prim for item in shot.grooms), find_curves(shot.stage)),
     ]
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which frames a bake lacks."""
+"""Which frames a bake lacks, or hides in the one that it goes over."""
 
 import numpy as np
-from pxr import Usd
+from pxr import Usd, UsdGeom
+
+from .recorded import recorded
 
 
 def gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
@@ -37,4 +39,23 @@ def thinned(codes: list[float], frame: float) -> list[str]:
     return [
         f"{len(fewer)} of {len(numbers)} frames, the first at {first:g}, have fewer samples than others, which have "
         f"{counts.max()}; bake them again with the same --subframes, unless that is meant"
+    ]
+
+
+def hidden(prim: Usd.Prim, codes: list[float], frame: float) -> list[str]:
+    """The note on samples of an earlier bake of a groom that a new one at time codes hides, so that hair stands still there.
+
+    Args:
+        prim: the groom.
+        codes: ascending.
+        frame: time codes between two frames.
+    """
+    former = UsdGeom.BasisCurves(prim).GetPointsAttr().GetTimeSamples() if recorded(prim) else []
+    outside = [code for code in former if not codes[0] - frame / 2 < code < codes[-1] + frame / 2]
+    if not outside:
+        return []
+    new = f"{codes[0]:g} to {codes[-1]:g}" if codes[1:] else f"{codes[0]:g}"
+    return [
+        f"{prim.GetPath()}: is baked already at time codes {former[0]:g} to {former[-1]:g}, which the new samples, at {new}, hide "
+        "everywhere, so that hair stands still before and after; bake all frames, or join this part with those of the others"
     ]

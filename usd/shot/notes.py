@@ -245,13 +245,21 @@ def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
     if len(samples) < 2:
         return []
     within = min(samples[-1], last) - max(samples[0], first)
-    if within >= 0.5 * (last - first):  # a shot may have handles
+    if within >= 0.5 * (last - first) or _moves_on(rig, first, last):  # a shot may have handles
         return []
     much, held = ("none of it", "a held pose") if within < 0 else ("little of it", "elsewhere a held pose")
     return [
         f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, {much} within {first:g} to "
         f"{last:g}: {held}; check --frames, the shot's range and the layer offsets"
     ]
+
+
+def _moves_on(rig: StageRig, first: float, last: float) -> bool:
+    """Whether what places a character moves before its first key or after its last one: a spline may loop."""
+    keys, placed = rig.source.keys.every, rig.source.placement
+    codes = [code for code in np.linspace(first, last, 9) if not keys[0] <= code <= keys[-1]]
+    ends = np.clip(codes, keys[0], keys[-1])
+    return not all(np.allclose(placed.at(code), placed.at(end)) for code, end in zip(codes, ends))
 
 
 def without_strength(strength: float, dynamic: bool) -> list[str]:

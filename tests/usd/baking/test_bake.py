@@ -188,6 +188,13 @@ def test_sliders_that_a_model_never_heard_of_are_said(tmp_path, still_model):
         assert not any("change nothing" in note for note in notes(which, **options))
 
 
+def test_frames_of_an_earlier_bake_that_a_new_one_hides_are_said(tmp_path, baked, still_model):
+    _, whole = baked
+    for frames, told in (("3:5", True), ("1:9", False), (None, False), ("1:9:4", False)):
+        notes = bake(whole.path, tmp_path / "retake.usdc", still_model, frames=frames).notes
+        assert any("/Hero/Hair: is baked already at time codes 1 to 9" in note for note in notes) == told
+
+
 def test_frames_without_animation_are_said(tmp_path, still_model):
     """A shot at 1001 whose animation stayed at 1: no file has an error, and nothing moves."""
     shot = write_shot(tmp_path)

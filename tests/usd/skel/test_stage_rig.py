@@ -11,6 +11,7 @@ from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import StrandModel
 from usd.border.time_codes import time_codes
+from usd.shot.notes import out_of_range
 from usd.shot.stage import read_rigs, read_shot
 
 from ..shots import Recipe, write_shot
@@ -79,6 +80,20 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note
 
 
+CURVE = ((1, 0.0), (5, 80.0), (9, 20.0))
+
+
+def _spline(ts):
+    spline = ts.Spline("float")
+    for code, angle in CURVE:
+        knot = ts.Knot("float")
+        knot.SetTime(code)
+        knot.SetValue(angle)
+        knot.SetNextInterpolation(ts.InterpLinear)
+        spline.SetKnot(knot)
+    return spline
+
+
 def test_a_root_on_animation_curves_moves_as_one_with_samples(tmp_path):
     ts = pytest.importorskip("pxr.Ts")
     rigs = []
@@ -86,19 +101,26 @@ def test_a_root_on_animation_curves_moves_as_one_with_samples(tmp_path):
         path = write_shot(tmp_path, Recipe(frames=0), f"curved_{curved}")
         stage = Usd.Stage.Open(str(path))
         turn = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddRotateYOp().GetAttr()
-        spline = ts.Spline("float")
-        for code, angle in ((1, 0.0), (5, 80.0), (9, 20.0)):
-            knot = ts.Knot("float")
-            knot.SetTime(code)
-            knot.SetValue(angle)
-            knot.SetNextInterpolation(ts.InterpLinear)
-            spline.SetKnot(knot)
+        for code, angle in CURVE:
             turn.Set(angle, code)
         if curved:
             turn.Clear()
-            turn.SetSpline(spline)
+            turn.SetSpline(_spline(ts))
         stage.GetRootLayer().Save()
         rigs.append(read_rigs(path)[0])
     assert rigs[1].source.animated
     np.testing.assert_allclose(rigs[1].clip.joints, rigs[0].clip.joints, atol=1e-6)
     assert len(rigs[1].time_codes) == 9
+
+
+def test_a_root_on_curves_that_go_on_is_not_said_to_stand_still(tmp_path):
+    ts = pytest.importorskip("pxr.Ts")
+    path = write_shot(tmp_path, Recipe(frames=0))
+    for mode, held in ((ts.ExtrapHeld, True), (ts.ExtrapLoopRepeat, False)):
+        stage = Usd.Stage.Open(str(path))
+        spline = _spline(ts)
+        spline.SetPostExtrapolation(ts.Extrapolation(mode))
+        root = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero"))
+        (root.GetRotateYOp() or root.AddRotateYOp()).GetAttr().SetSpline(spline)
+        stage.GetRootLayer().Save()
+        assert bool(out_of_range(read_rigs(path)[0], 1, 49)) == held
