@@ -5,10 +5,10 @@
 
 Each constant is set to the low end, the default and the high end of its range, with the others at their defaults, in motion
 that shows it. The effect is a difference of one number: `droop`, how far tips move from rest while the body bows;
-`swing`, how far vertices move about their mean while the head shakes; `parting`, how far the tips of neighbouring strands
-move apart or together, rms over six motions, since few pairs part far and the motion decides which. Strands are from locks
-that training holds out. The last column is the model's effect divided by the solver's. It takes about a minute per
-groom.
+`swing`, how far vertices move about their mean, and `parting`, how far the tips of neighbouring strands move apart or
+together, both rms over six motions: few pairs part far, and the motion decides which, and how much damping matters. Strands
+are from locks that training holds out. The last column is the model's effect divided by the solver's. It takes about a
+minute per groom.
 """
 
 from __future__ import annotations
@@ -33,11 +33,12 @@ from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
 
+EVERY = ("shake", "turn", "walk", "jump", "nod", "bow")
 SHOWS = {
     "bend": (("bow",), "droop"),
     "weight": (("bow",), "droop"),
-    "damping": (("shake",), "swing"),
-    "clumping": (("shake", "turn", "walk", "jump", "nod", "bow"), "parting"),
+    "damping": (EVERY, "swing"),
+    "clumping": (EVERY, "parting"),
 }
 """Constant -> the motions that show it, and the number that it changes."""
 SECONDS = 3.0
