@@ -10,7 +10,6 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import lru_cache
-from numbers import Integral
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from neuralocks_core.measures import another_body, known_body
 from neuralocks_core.motion import Clip
 from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND
 from neuralocks_core.number_arrays import number_array
+from neuralocks_core.whole_numbers import is_whole
 
 CHUNK = 512
 """Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed, so that results
@@ -72,8 +72,7 @@ class StrandModel:
         self.anchored = file.meta.get("anchored", False)
         if not isinstance(self.anchored, bool):
             raise NeuralocksError(f"{file.path}: its 'anchored' is neither true nor false; get an undamaged copy")
-        whole = isinstance(threads, Integral) and not isinstance(threads, bool)
-        if threads is not None and not (whole and threads >= 1):
+        if threads is not None and not is_whole(threads, 1):
             raise NeuralocksError(f"threads {threads!r}: must be a whole number from 1 on; leave it out for one a core")
         self.threads = threads or cores()
         self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="neuralocks")

@@ -17,6 +17,7 @@ from neuralocks_core.hairstyles.style import Style
 from neuralocks_core.hairstyles.variation import Variation
 from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.strands.strand_set import root_uv
+from neuralocks_core.whole_numbers import is_whole
 
 STYLES = {**loose.STYLES, **tied.STYLES}
 """The styles that `grow` knows, by name."""
@@ -49,16 +50,16 @@ def grow(
         style: one of `STYLES`.
         scalp: where hair grows, in bind space.
         count: how many strands, 1 to 150,000.
-        seed: the same seed gives the same groom.
+        seed: a whole number from 0 on; the same seed gives the same groom.
         body: points (V, 3) [m] and triangles (F, 3) that hair keeps out of, or an `Obstacle` made from them,
             which is worth keeping for several styles; without one, a typical head, neck and shoulders.
         variation: number of a variation of the style, with another cut, parting, waves and direction; 0 is the style itself.
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: an unknown style, no scalp, a strand count out of range, or a variation below 0.
+        NeuralocksError: an unknown style, no scalp, or a count, seed or variation that is no whole number or out of range.
     """
-    check_style(style, count, variation)
+    check_style(style, count, variation, seed)
     if not isinstance(scalp, Scalp):
         raise NeuralocksError(
             f"scalp: {scalp!r} is not one; give a Scalp, such as hairstyles.from_head marks on a head"
@@ -97,18 +98,22 @@ def grow(
     )
 
 
-def check_style(style: str, count: int, variation: int = 0) -> None:
+def check_style(style: str, count: int, variation: int = 0, seed: int = 0) -> None:
     """Refuse what `grow` cannot grow; it takes seconds to look at a head first.
 
     Raises:
-        NeuralocksError: an unknown style, a strand count out of range, or a variation below 0.
+        NeuralocksError: an unknown style, or a count, seed or variation that is no whole number or out of range.
     """
-    if style not in STYLES:
-        raise NeuralocksError(f"style '{style}': is unknown; use one of {', '.join(STYLES)}")
-    if not 1 <= count <= MOST_STRANDS:
-        raise NeuralocksError(f"style '{style}': {count} strands are out of range; give 1 to {MOST_STRANDS}")
-    if variation < 0:
-        raise NeuralocksError(f"style '{style}': there is no variation {variation}; give 0 or more")
+    if not isinstance(style, str) or style not in STYLES:
+        raise NeuralocksError(f"style {style!r}: is unknown; use one of {', '.join(STYLES)}")
+    if not is_whole(count, 1, MOST_STRANDS):
+        raise NeuralocksError(
+            f"style '{style}': cannot have {count!r} strands; give 1 to {MOST_STRANDS}, a whole number"
+        )
+    if not is_whole(variation, 0):
+        raise NeuralocksError(f"style '{style}': there is no variation {variation!r}; give a whole number, 0 or more")
+    if not is_whole(seed, 0):
+        raise NeuralocksError(f"style '{style}': {seed!r} is no seed; give a whole number, 0 or more")
 
 
 def _site(style: Style, scalp: Scalp, count: int, random: np.random.Generator, size: float) -> Site:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rotation import unit
@@ -34,7 +35,7 @@ class Scalp:
     triangles: np.ndarray
     """(F, 3) int, outward."""
     head_centre: np.ndarray
-    """(3,) float64 [m], middle of the skull."""
+    """(3,) float64 [m], middle of the skull, in bind space too: `Character.head_centre` is in canonical space."""
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points, np.float64)
@@ -141,11 +142,12 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
     Args:
         points: (V, 3) [m], bind space, Y up, face +Z; of the head or the whole body.
         triangles: (F, 3) int, outward.
-        head_centre: (3,) [m], middle of the skull.
-        size: about how many times a person's size a giant is.
+        head_centre: (3,) [m], middle of the skull, in bind space: that of a character is
+            `transformed(character.head_centre, character.canonical_to_bind)`.
+        size: about how many times a person's size a giant is, `Character.times_human`.
 
     Raises:
-        NeuralocksError: no part of the mesh is where a scalp would be.
+        NeuralocksError: no part of the mesh is where a scalp would be, or the centre is not that of a head of this size.
     """
     points = np.asarray(points, np.float64)
     triangles = np.asarray(triangles, np.int64)
@@ -159,6 +161,11 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
             "scalp: no mesh lies above the head's centre; choose another head joint, or give the body with its head"
         )
     radius = float(middle[above, 1].max())
+    if radius > HEAD_WIDTHS[1] * size:  # as if a canonical centre, which is near the origin, were one in bind space
+        raise NeuralocksError(
+            f"scalp: the mesh reaches {radius:.2g} m above the head's centre, too far for a head; choose another head joint, or "
+            "give head_centre in bind space, and the size of a giant"
+        )
     seen = middle / radius
     skull = seen[(seen[:, 1] > 0.35) & (np.linalg.norm(seen, axis=1) < 1.5)]
     back, front = skull[:, 2].min(), skull[:, 2].max()

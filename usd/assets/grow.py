@@ -61,11 +61,11 @@ def grow(
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: an unknown style, no head with skin, or a file that cannot be written.
+        NeuralocksError: an unknown style, a number out of range, no head with skin, or a file that cannot be written.
     """
     out, with_character = as_path(out, "out"), flag("--with-character", with_character)
     check_layer_name(out)
-    check_style(style, count, variation)
+    check_style(style, count, variation, seed)
     rigs = read_rigs(character, skeleton, head)
     rig = rigs[0]
     (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())

@@ -202,8 +202,20 @@ def test_a_mouth_is_no_room_for_hair():
         (lambda: grow("bob", None, 10), "scalp: None is not one; give a Scalp"),
         (lambda: grow("bob", SCALP, 10, body=(BODY[0] + 9, BODY[1])), "same space"),
         (lambda: from_head(BODY[0] - [0, 5, 0], BODY[1], CENTRE), "choose another head joint"),
+        (lambda: from_head(*BODY, [0.0, 0.06, 0.03]), "reaches 1.7 m above .* give head_centre in bind space"),
+        (lambda: grow(["bob"], SCALP, 10), "style ..bob..: is unknown"),
     ],
 )
 def test_bad_input_is_named(call, message):
     with pytest.raises(NeuralocksError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("count", (100.5, "100", None, True)), ("seed", (-1, 1.5, "a")), ("variation", (-1, 1.5, "1"))],
+)
+def test_numbers_of_a_style_are_whole(name, values):
+    for value in values:
+        with pytest.raises(NeuralocksError, match=f"style 'bob': .*{value!r}.*; give .*whole number"):
+            grow("bob", SCALP, **{"count": 10, name: value})
