@@ -61,7 +61,7 @@ WRONG = {
     "number as groom": ({"grooms": 5}, "grooms: 5 is not a prim path"),
     "number as skeleton": ({"skeleton": 5}, "skeleton: 5 is not a prim path"),
     "number as frames": ({"frames": 5}, "frames: 5 holds no time codes"),
-    "word as cuts": ({"cuts": "25"}, "cuts: '25' holds no time codes"),
+    "word as cuts": ({"cuts": "none"}, "cuts: 'none' holds no time codes; give a list .*, or .. if there are none"),
     "word as strength": ({"strength": "1"}, "--strength '1': must be a number from 0 to 4"),
     "no strength": ({"strength": float("nan")}, "--strength nan: must be"),
     "truth as jobs": ({"jobs": True}, "--jobs True: must be a whole number"),

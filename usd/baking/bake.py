@@ -12,7 +12,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.flags import flag
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
-from neuralocks_core.runtime import StrandModel, cores
+from neuralocks_core.runtime import StrandModel
 from neuralocks_core.wind import check_felt
 
 from ..border.amounts import check_number
@@ -62,15 +62,15 @@ def bake(
         frames: `FIRST:LAST[:STEP]`, or time codes in any order; the shot's range if left out.
         joints: semantic joint -> joint (path, or its last part), if names are not enough.
         subframes: samples per frame, for motion blur.
-        material: a Material, or words NAME=VALUE.
+        material: a Material, words NAME=VALUE such as "bend=2x", or a dict of them: {"bend": "2x"}.
         strength: motion strength from 0 (each pose as if held) to 4; 1 is as trained.
         wind: acceleration of all hair by a wind, three numbers in the stage's axes [m/s^2]; see `neuralocks_core.wind`.
         gusts: share of it by which it varies, 0.5 if left out.
         resolve: push hair out of the body after the network.
         loop: the clip repeats, and its last sample shows the pose of its first: at the start, hair remembers the end of the clip.
-        cuts: time codes at which a character is suddenly elsewhere and its hair starts anew; detected if None.
+        cuts: time codes at which a character is suddenly elsewhere and its hair starts anew; [] if there are none, detected if None.
         velocities: write velocities.
-        jobs: threads; if left out, one per core, eight at most.
+        jobs: threads; if left out, a StrandModel's own, else one per core, eight at most.
         tell: called with the notes known before hair is posed, then with the others.
         progress: called with (done, total, message); raising from it stops the bake.
 
@@ -81,7 +81,8 @@ def bake(
     out = as_path(out, "out")
     check_layer_name(out)
     resolve, loop, velocities = flag("--resolve", resolve), flag("--loop", loop), flag("--velocities", velocities)
-    jobs = _jobs(jobs)
+    if jobs is not None:
+        check_number("--jobs", jobs, 1, 1024, whole=True)
     movers = Movers(model, jobs)
     look = as_material(material)
     check_number("--strength", strength, 0, 4)
@@ -129,13 +130,6 @@ def as_material(material) -> Material:
             f"material: {material!r} is not one; give a Material, words such as 'bend=2x', or a dict of them"
         )
     return Material.parse(words)
-
-
-def _jobs(jobs: int | None) -> int:
-    if jobs is None:
-        return cores()
-    check_number("--jobs", jobs, 1, 1024, whole=True)
-    return jobs
 
 
 def _digest(model: StrandModel) -> str:

@@ -17,7 +17,7 @@ class Movers:
 
     Args:
         given: path of a strand model; a StrandModel, which then moves every groom; None for the shipped ones.
-        threads: as for `StrandModel`.
+        threads: as for `StrandModel`; a StrandModel that is given keeps its own if None.
 
     Raises:
         NeuralocksError: the file is missing, damaged, of a later format or not a model of strands.
@@ -25,7 +25,7 @@ class Movers:
 
     def __init__(self, given: str | os.PathLike | StrandModel | None = None, threads: int | None = None):
         self._load = cache(lambda path: StrandModel.load(path, threads))
-        self.asked = given if isinstance(given, StrandModel) else StrandModel.load(given, threads)
+        self.asked = _of_threads(given, threads) if isinstance(given, StrandModel) else StrandModel.load(given, threads)
         """The one asked for; the shipped one that knows all styles if none was. All shipped ones read the same motion."""
         self._named = None if given is None else self.asked.file.path
         self._paths: dict[str, Path] = {}
@@ -47,3 +47,8 @@ class Movers:
         for item in grooms:
             found.setdefault(self.path(item), []).append(item)
         return [(self.of(items[0]), items) for items in found.values()]
+
+
+def _of_threads(model: StrandModel, threads: int | None) -> StrandModel:
+    """A model itself, or the same one with another number of threads: loaded graphs are shared."""
+    return model if threads in (None, model.threads) else StrandModel(model.file, threads)

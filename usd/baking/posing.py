@@ -39,7 +39,7 @@ class GroomPoser:
         *,
         strength: float = 1.0,
         wind: Wind | None = None,
-        resolve: bool = False,
+        resolve: bool = True,
         loop: bool = False,
     ):
         attachment, self._model = items[0].attachment, model

@@ -88,7 +88,7 @@ def given_cuts(cuts, loop: bool = False) -> list[float] | None:
     Raises:
         NeuralocksError: some are given for a loop.
     """
-    given = None if cuts is None else sorted(set(_numbers(cuts, "cuts")))
+    given = None if cuts is None else sorted(set(_numbers(cuts, "cuts", ", or [] if there are none")))
     if loop and given:
         raise NeuralocksError("--cuts: a loop has none; leave out --loop")
     return [] if loop else given
@@ -108,9 +108,11 @@ def _off(code: float) -> float:
     return abs(code - round(code))
 
 
-def _numbers(codes, name: str) -> list[float]:
-    """Time codes that a caller gives for the argument `name`."""
+def _numbers(codes, name: str, otherwise: str = "") -> list[float]:
+    """Time codes that a caller gives for the argument `name`; `otherwise` is what it may be besides a list of some."""
     try:
         return [float(code) for code in (None if isinstance(codes, str) else codes)]
     except (TypeError, ValueError):
-        raise NeuralocksError(f"{name}: {codes!r} holds no time codes; give a list such as [25, 49]") from None
+        raise NeuralocksError(
+            f"{name}: {codes!r} holds no time codes; give a list such as [25, 49]{otherwise}"
+        ) from None

@@ -11,8 +11,6 @@ from typing import Annotated
 
 import typer
 
-from neuralocks_core.errors import NeuralocksError
-
 from .assets import body_command, grow_command, import_command
 from .bake import bake_command, join_command, simulate_command
 from .command import command_of, note, one_line, print_json, say
@@ -136,18 +134,15 @@ def evaluate_command(
     """Print a bake's report card. The bake records its material and head; repeat --groom, --skeleton and --joint."""
     from neuralocks_core.evaluation.report import check_plot
 
-    from ..baking.bake import as_material
     from ..review.evaluate import evaluate
     from .progress import progress_bar
 
-    if model is not None and not reference:
-        raise NeuralocksError("--model: its held-pose answer is shown beside the reference; add --reference")
     if plot is not None:
         check_plot(plot)
     with progress_bar("evaluating") as progress:
         card = evaluate(
             baked, reference, grooms=groom or None, skeleton=skeleton, head=head, joints=pairs(joint, "--joint"),
-            model=model, material=as_material(material) if material else None, progress=progress,
+            model=model, material=material or None, progress=progress,
         )  # fmt: skip
     if as_json:
         typer.echo(card.to_json())

@@ -10,6 +10,7 @@ from neuralocks_core.flags import flag
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress, silent
 
+from ..baking.bake import as_material
 from ..baking.batches import grouped
 from ..baking.movers import Movers
 from ..border.damage import names_damage
@@ -30,7 +31,7 @@ def evaluate(
     head: str | None = None,
     joints: dict[str, str] | None = None,
     model=None,
-    material: Material | None = None,
+    material=None,
     progress: Progress | None = None,
 ) -> Card:
     """Measure a bake, whatever made it.
@@ -39,14 +40,18 @@ def evaluate(
         baked: path of the bake, or a `Baked` already read.
         reference: simulate the same strands and compare.
         grooms, skeleton, head, joints: as for `bake`.
-        model: with `reference`, the model whose held-pose answer is shown next to it; if left out, the shipped one that suits each groom.
-        material: what the hair is made of, for energies and reference; if left out, what each groom's bake records.
+        model: only with `reference`: the model whose held-pose answer is shown next to it; if left out, the shipped one that suits each groom.
+        material: what the hair is made of, for energies and reference: a Material, words NAME=VALUE or a dict of them, as for
+            `bake`; if left out, what each groom's bake records.
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the file is not a bake, or the reference is not installed.
+        NeuralocksError: the file is not a bake, an argument cannot be used, or the reference is not installed.
     """
     reference = flag("--reference", reference)
+    if model is not None and not reference:
+        raise NeuralocksError("--model: its held-pose answer is shown beside the reference; add --reference")
+    asked = None if material is None else as_material(material)
     beside = _models_beside(model) if reference else None  # before minutes of work
     if not isinstance(baked, Baked):
         baked = read_baked(baked, grooms, skeleton, head, joints)
@@ -64,7 +69,7 @@ def evaluate(
         begin += len(items)
         for subject, inside in zip(subjects, deep, strict=True):
             item = subject.item
-            look = material or recorded_material(item.prim) or Material()
+            look = asked or recorded_material(item.prim) or Material()
             measured[item.path] = subject.measures(look, inside)
             if not len(subject.chosen):
                 notes.append(f"{item.path}: no strand has two distinct points; nothing is measured")

@@ -71,6 +71,13 @@ def test_a_model_in_memory_moves_all(shot, suits, model):
     assert used[0] is loaded and len(used[1]) == 2
 
 
+def test_the_threads_asked_for_are_those_of_a_model_in_memory_too(model):
+    loaded = StrandModel.load(model, threads=2)
+    assert movers.Movers(loaded).asked is movers.Movers(loaded, 2).asked is loaded
+    again = movers.Movers(loaded, 1).asked
+    assert again.threads == 1 and again.file is loaded.file and loaded.threads == 2
+
+
 def test_an_export_is_of_one_model(shot, tmp_path, suits, model):
     out = tmp_path / "out"
     with pytest.raises(

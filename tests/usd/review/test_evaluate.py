@@ -137,6 +137,20 @@ def test_of_a_groom_without_hair_nothing_is_claimed(tmp_path, model):
     assert any("nothing is measured" in note for note in card.notes)
 
 
+def test_words_and_dicts_name_a_material_as_they_do_for_a_bake(tmp_path, model):
+    bake(write_shot(tmp_path), tmp_path / "hair.usdc", model)
+    bends = [
+        next(iter(evaluate(tmp_path / "hair.usdc", material=look).grooms.values()))["energy_bend"]
+        for look in (None, Material(bend=2e-3), "stiffness=2x", ["bend=2x"], {"stiffness": "2x"})
+    ]
+    assert bends[1:] == pytest.approx([2 * bends[0]] * 4)
+
+
+def test_a_model_is_shown_beside_the_reference_only(rigid):
+    with pytest.raises(NeuralocksError, match="add --reference"):
+        evaluate(rigid, model="nonexistent.neuralocks")
+
+
 def test_a_stage_without_samples_is_no_bake():
     with pytest.raises(NeuralocksError, match="no animated points"):
         read_baked(shipped_shot())
