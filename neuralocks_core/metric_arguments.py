@@ -44,6 +44,48 @@ def rows_of(name: str, values, rest_name: str, rest) -> tuple[np.ndarray, np.nda
     return values, rest
 
 
+def shaped(name: str, given, wanted: str, *shape: int | None) -> np.ndarray:
+    """Numbers of a shape, in floating point.
+
+    Args:
+        name: of the argument.
+        given: what a caller gives for it.
+        wanted: its shape and unit, for the message.
+        shape: sizes of its axes; None for any.
+
+    Raises:
+        NeuralocksError: they are of another shape.
+    """
+    array = reals(name, given, wanted)
+    if array.ndim != len(shape) or any(size not in (None, found) for size, found in zip(shape, array.shape)):
+        raise NeuralocksError(f"{name}: is of shape {array.shape}; give {wanted}")
+    return array
+
+
+def edges_of(points) -> np.ndarray:
+    """Edges (..., K - 1, 3) of strands (..., K, 3), in double precision.
+
+    Raises:
+        NeuralocksError: these are no strands.
+    """
+    points = number_array("points", points, "(..., K, 3) metres")
+    if points.ndim < 2 or points.shape[-1] != 3:
+        raise NeuralocksError(f"points: are of shape {points.shape}; give strands, (..., K, 3)")
+    return np.diff(points, axis=-2)
+
+
+def counts_of(counts, points: int) -> np.ndarray:
+    """Vertices (S,) of each strand, of points in all.
+
+    Raises:
+        NeuralocksError: they are no whole numbers from 0 on, or of more or fewer points.
+    """
+    counts = np.asarray(counts)
+    if counts.dtype.kind not in "iu" or counts.ndim != 1 or (counts < 0).any() or counts.sum() != points:
+        raise NeuralocksError(f"counts: give whole numbers of vertices, (S,), which add up to the {points} points")
+    return counts
+
+
 def ascending(times, count: int) -> np.ndarray:
     """Times (count,) [s], ascending.
 

@@ -9,8 +9,7 @@ times. What does not fit together, such as a reference of other frames, is a Neu
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.metric_arguments import ascending, hair_of, reals, rows_of
-from neuralocks_core.number_arrays import number_array
+from neuralocks_core.metric_arguments import ascending, counts_of, edges_of, hair_of, reals, rows_of, shaped
 
 DYNAMIC_SHARE = 0.35
 """A frame counts as dynamic if hair moves at least at this share of the reference's speed (Neuroll, table 1)."""
@@ -33,12 +32,12 @@ QUIET_AFTER = 2.0
 
 def strand_lengths(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Length [m] of each strand, (..., S), for points (..., P, 3) in strands of `counts` (S,) vertices."""
-    points = np.asarray(points, float)
-    edges = np.linalg.norm(np.diff(points, axis=-2), axis=-1)
+    edges = np.linalg.norm(edges_of(points), axis=-1)
+    counts = counts_of(counts, np.shape(points)[-2])
     ends = np.cumsum(counts)
     total = np.concatenate([np.zeros((*edges.shape[:-1], 1)), np.cumsum(edges, axis=-1)], axis=-1)
     last = np.clip(ends - 1, 0, None)
-    return np.where(np.asarray(counts) > 1, total[..., last] - total[..., np.clip(ends - counts, 0, last)], 0.0)
+    return np.where(counts > 1, total[..., last] - total[..., np.clip(ends - counts, 0, last)], 0.0)
 
 
 def stretch(lengths: np.ndarray, rest: np.ndarray) -> dict[str, float]:
@@ -96,7 +95,7 @@ def speed(points: np.ndarray, times: np.ndarray, cuts: np.ndarray = ()) -> np.nd
     jump is no motion: two times before and after one of them have no speed, and are left out.
     """
     points, times = hair_of(times, points=points)
-    cuts = np.sort(number_array("cuts", cuts, "(C,) seconds")) - 1e-9
+    cuts = np.sort(shaped("cuts", cuts, "(C,) seconds", None)) - 1e-9
     kept = np.flatnonzero(np.diff(np.searchsorted(cuts, times, side="right")) == 0)
     far = np.empty((len(kept), *points.shape[1:-1]), np.result_type(points, np.float32))
     for row, frame in enumerate(kept):  # all differences at once would be as large as all points
@@ -180,17 +179,19 @@ def settling_time(points: np.ndarray, times: np.ndarray, stop: float) -> float:
     """Time [s] after `stop` until the mean tip speed stays below SETTLED of its largest value after the stop, or below STILL if that
     is more.
 
-    Tips that never exceed the speed STILL have settled at once; for tips that never settle, it is the time left. NaN if points are.
+    Tips that never exceed the speed STILL have settled at once; for tips that never settle, it is the time left. NaN if points are,
+    or if no two times come after the stop: nothing is known then.
     """
     points, times = hair_of(times, points=points)
+    stop = shaped("stop", stop, "a number of seconds")
     tips = speed(points[:, :, -1:], times).mean(axis=(1, 2))
     middle = (times[1:] + times[:-1]) / 2
     after = middle >= stop
-    peak = tips[after].max(initial=0.0)
-    if peak < STILL:
-        return 0.0
+    peak = tips[after].max(initial=0.0) if after.any() else np.nan
     if np.isnan(peak):
         return float("nan")
+    if peak < STILL:
+        return 0.0
     loud = np.flatnonzero(after & (tips > max(SETTLED * peak, STILL)))
     return float(times[loud[-1] + 1] - stop) if len(loud) else 0.0
 
@@ -201,6 +202,7 @@ def echo(points: np.ndarray, reference: np.ndarray, times: np.ndarray, stop: flo
     is wrong.
     """
     *hair, times = hair_of(times, points=points, reference=reference)
+    stop = shaped("stop", stop, "a number of seconds")
     tips, true = (speed(p[:, :, -1:], times).mean(axis=(1, 2)) for p in hair)
     since = (times[1:] + times[:-1]) / 2 - stop
     later = (since >= 0.5) & (since < 2.0)
@@ -210,7 +212,7 @@ def echo(points: np.ndarray, reference: np.ndarray, times: np.ndarray, stop: flo
 
 def turning(points: np.ndarray) -> float:
     """Mean angle [degrees] between successive edges of strands (..., K, 3): what makes hair look smooth, curly or crinkled."""
-    edges = np.diff(np.asarray(points, float), axis=-2)
+    edges = edges_of(points)
     before, after = edges[..., :-1, :], edges[..., 1:, :]
     across = np.linalg.norm(np.cross(before, after), axis=-1)
     along = np.einsum("...i,...i->...", before, after)
@@ -233,9 +235,7 @@ def droop(displacement: np.ndarray, down: np.ndarray) -> float:
         down: unit vectors of gravity in canonical axes, (T, 3).
     """
     (displacement,) = hair_of(displacement=displacement)
-    down = reals("down", down, "(T, 3) unit vectors")
-    if down.shape != (len(displacement), 3):
-        raise NeuralocksError(f"down: is of shape {down.shape}; give {(len(displacement), 3)}, one for each frame")
+    down = shaped("down", down, f"a unit vector for each of {len(displacement)} frames", len(displacement), 3)
     return 100 * _mean(np.einsum("tsi,ti->ts", displacement[:, :, -1].astype(float, copy=False), down))
 
 
@@ -250,6 +250,9 @@ def held(joints: np.ndarray, times: np.ndarray) -> np.ndarray:
 
     Nor does any within HELD_TIME before or after, times (T,) [s]: with many samples per frame, each changes little in slow motion.
     """
+    joints = shaped("joints", joints, "(T, n, 4, 4) transforms", None, None, 4, 4)
+    if not joints.size:
+        raise NeuralocksError(f"joints: are of shape {joints.shape}; give one transform or more")
     times = ascending(times, len(joints))
     rows = np.arange(len(times))
     before = np.searchsorted(times, times - HELD_TIME + 1e-9, side="right") - 1

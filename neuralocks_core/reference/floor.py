@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.metric_arguments import shaped
 from neuralocks_core.metrics import motion_error, position_error
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.solver import simulate
+from neuralocks_core.whole_numbers import is_whole
 
 
 @dataclass(frozen=True)
@@ -58,14 +60,19 @@ def stateless_floor(
         options: of `simulate`; the same for both.
 
     Raises:
-        NeuralocksError: the clip is not longer than the history, or the errors of `simulate`.
+        NeuralocksError: history or every is no whole number, the clip is not longer than the history, truth is of other frames or
+            strands, or the errors of `simulate`.
     """
     count = len(head)
+    if not is_whole(history) or not is_whole(every):
+        raise NeuralocksError(f"history {history!r}, every {every!r}: give whole numbers of frames")
     if history < 1 or every < 1 or count <= history + every:
         raise NeuralocksError(
             f"head: {count} frames for a history of {history} looked at every {every}; give a longer clip"
         )
-    if truth is None:
+    if truth is not None:
+        truth = shaped("truth", truth, "(T, S, K, 3) points of `simulate` over the whole clip", count, *np.shape(rest))
+    else:
         truth = simulate(rest, head, body, triangles, material, wind=wind, **options).points
     if body is not None and options.get("bind_body") is None:
         # else each restart would measure the rest distances on its own first pose

@@ -6,9 +6,7 @@ import pytest
 
 from neuralocks_core import metrics
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.evaluation.pose_energies import curvature, energies, stretch_energy
 from neuralocks_core.evaluation.report import LABELS
-from neuralocks_core.materials import Material
 
 TIMES = np.arange(0, 4, 1 / 50)
 LENGTH = np.array([0.3, 0.5])
@@ -106,6 +104,21 @@ def test_dynamic_frames_counts_the_longest_run():
     assert 55 <= metrics.dynamic_frames(stopped, stopped, TIMES) <= 60
 
 
+@pytest.mark.parametrize(("share", "counted"), [(0.3, False), (0.4, True)])
+def test_a_frame_is_dynamic_from_35_percent_of_the_references_speed_on(share, counted):
+    reference, rest = swinging()
+    run = metrics.dynamic_frames(rest + share * (reference - rest), reference, TIMES)
+    assert run == (metrics.dynamic_frames(reference, reference, TIMES) if counted else 0)
+
+
+def test_strands_that_move_less_than_half_a_percent_of_their_length_have_no_motion_to_compare():
+    reference, rest = swinging(amplitude=1.0)
+    rms = np.sqrt(np.square(reference - rest).sum(axis=-1).mean(axis=(0, 2)))
+    slight = rest + (reference - rest) * (np.array([0.004, 0.006]) * LENGTH / rms)[:, None, None]
+    _, moving = metrics.swings(rest + 0 * slight, slight, LENGTH)
+    assert moving == pytest.approx([0.006 * LENGTH[1]])
+
+
 def test_dynamic_frames_are_samples_and_the_card_says_so():
     """A shot's frame may have several samples."""
     reference, _ = swinging()
@@ -191,6 +204,9 @@ def test_what_is_unknown_is_not_fine():
     for pair in ((broken, reference), (reference, broken), (broken, broken)):
         assert np.isnan(list(metrics.motion_error(*pair, LENGTH).values())).all()
     assert np.isnan(metrics.settling_time(broken, TIMES, stop=0.0))
+    for nothing_after in (TIMES[-1], 99.0, np.nan):
+        assert np.isnan(metrics.settling_time(reference, TIMES, nothing_after))
+        assert np.isnan(metrics.echo(reference, reference, TIMES, nothing_after))
 
 
 REFERENCE, _ = swinging()
@@ -214,6 +230,16 @@ DISTANCE, DOWN = np.ones((4, 5)), np.tile([0, -1.0, 0], (len(TIMES), 1))
         (lambda hair: metrics.speed(hair, TIMES[::-1]), "times: give ascending seconds"),
         (lambda hair: metrics.settling_time(hair, TIMES[:-1], 0.0), "times: give ascending seconds"),
         (lambda hair: metrics.held(np.zeros((80, 1, 4, 4)), TIMES[:80][::-1]), "times: give ascending seconds"),
+        (lambda hair: metrics.held(np.zeros((80, 4, 4)), TIMES[:80]), "joints: is of shape .80, 4, 4.; give"),
+        (lambda hair: metrics.held([[1, 2], [3]], TIMES[:2]), "joints: is not an array of numbers"),
+        (lambda hair: metrics.held(np.zeros((80, 0, 4, 4)), TIMES[:80]), "joints: are of shape"),
+        (lambda hair: metrics.settling_time(hair, TIMES, None), "stop: is not an array of numbers; give a number of s"),
+        (lambda hair: metrics.echo(hair, hair, TIMES, [0.0, 1.0]), "stop: is of shape .2,.; give a number of seconds"),
+        (lambda hair: metrics.turning(LENGTH), "points: are of shape .2,.; give strands"),
+        (lambda hair: metrics.strand_lengths(LENGTH, [2]), "points: are of shape .2,.; give strands"),
+        (lambda hair: metrics.strand_lengths(hair[0, 0], [20]), "counts: give .* add up to the 24 points"),
+        (lambda hair: metrics.strand_lengths(hair[0, 0], [12.0, 12.0]), "counts: give whole numbers"),
+        (lambda hair: metrics.speed(hair, TIMES, 4.0), "cuts: is of shape"),
         (lambda hair: metrics.speed(hair, TIMES, "4"), "cuts: is not an array of numbers"),
         (lambda hair: metrics.tip_curves(hair.astype(str)), "displacement: is not an array of numbers"),
         (lambda hair: metrics.droop(hair, DOWN[:1]), "down: is of shape"),
@@ -243,39 +269,6 @@ def test_droop_is_measured_along_gravity_in_the_heads_axes():
     displacement[:, :, -1] = [0.0, 0.0, 0.03]
     down = np.array([[0, 0, 1.0], [0, 0, 1.0], [0, -1.0, 0]])
     assert metrics.droop(displacement, down) == pytest.approx(2)
-
-
-def arc(radius, plane=0.0, count=24, length=0.24):
-    """A strand bent to a circle, first along +Y; its plane turned about Y."""
-    angle = np.linspace(0, length / radius, count)
-    flat = np.stack([radius * (1 - np.cos(angle)), radius * np.sin(angle), 0 * angle], axis=1)
-    c, s = np.cos(plane), np.sin(plane)
-    return flat @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
-
-
-def test_curvature_of_a_circle_is_one_over_its_radius():
-    points = arc(0.05)
-    step = np.linalg.norm(np.diff(points, axis=0), axis=1).mean()
-    np.testing.assert_allclose(np.linalg.norm(curvature(points), axis=1) / step, 20, rtol=2e-3)
-    np.testing.assert_allclose(curvature(points)[1:], np.broadcast_to(curvature(points)[1], (21, 3)), atol=1e-9)
-
-
-def test_energies_of_known_shapes():
-    rest = np.zeros((1, 24, 3))
-    rest[0, :, 1] = np.linspace(0, 0.24, 24)
-    down = np.array([[0, -1.0, 0]])
-    zero = energies(rest[None], rest, down)
-    assert all(abs(value[0]) < 1e-12 for value in zero.values())
-    longer = energies(rest[None] * 1.1, rest, down)
-    edges = np.array([0.01, 0.02, 0.0])
-    np.testing.assert_allclose(
-        stretch_energy(np.stack([edges, 1.1 * edges]), edges), [0, 0.5 * 1000 * 0.01], atol=1e-12
-    )
-    assert longer["gravity"][0] == pytest.approx(9.81 * 0.012)
-    heavy = energies(rest[None] * 1.1, rest, down, Material(weight=2.0))
-    assert heavy["gravity"][0] == pytest.approx(2 * longer["gravity"][0])
-    bent = energies(arc(0.1)[None, None], rest, down, Material(bend=2e-3))
-    assert bent["bend"][0] == pytest.approx(0.5 * 2e-3 * 10**2, rel=0.06)
 
 
 def test_turning_of_a_circle_and_of_a_zigzag():

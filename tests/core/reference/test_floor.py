@@ -42,6 +42,20 @@ def test_wind_blows_in_restarts_as_it_does_in_the_clip():
     assert calm.position_percent > 10 * floor.position_percent
 
 
+@pytest.mark.parametrize(
+    ("changed", "fact"),
+    [
+        ({"truth": np.zeros((3, 2, 24, 3))}, r"truth: is of shape \(3, 2, 24, 3\); give"),
+        ({"truth": "all"}, "truth: is not an array of numbers"),
+        ({"history": 10.0}, "history 10.0, every 10: give whole numbers"),
+        ({"every": True}, "every True: give whole numbers"),
+    ],
+)
+def test_what_does_not_fit_is_named(changed, fact):
+    with pytest.raises(NeuralocksError, match=fact):
+        stateless_floor(groom(2), shaken(40), **{"history": 20} | changed)
+
+
 def test_short_clip_is_refused():
     with pytest.raises(NeuralocksError, match="longer"):
         stateless_floor(groom(2), shaken(10), history=20)
