@@ -50,7 +50,7 @@ def render(
         path: the file to write; its extension chooses the format.
         size: width and height of one picture in pixels.
         frames: numbers of the scene's frames: a strip shows these, or PANELS of them if there are more than MOST_PANELS; a clip
-            goes from the first to the last. All if left out.
+            goes from the first to the last. If left out, a strip shows PANELS of all, a clip all.
         azimuth: where the camera is: degrees from the face to the character's left.
         turntable: whether the camera goes round once, beginning there; round a single frame, too.
         rate: frames per second of a clip, which plays in real time.
@@ -84,7 +84,7 @@ def render(
                 views = zip(scene.times[chosen], seen_from)
                 _strip(part, images, [name(time) + (f", {angle:.0f}°" if turntable else "") for time, angle in views])
             else:
-                _CLIPS[kind](part, images, len(chosen), rate)
+                CLIPS[kind](part, images, len(chosen), rate)
             say(len(chosen), len(chosen), f"writing {path.name}")  # the last moment at which a caller may stop it
     return path
 
@@ -189,7 +189,7 @@ def _frames_of(clip: Path) -> int:
         return 0
 
 
-_CLIPS = {".mp4": _mp4, ".gif": _gif}
+CLIPS = {".mp4": _mp4, ".gif": _gif}
 """Ending -> what writes such a clip; both are called alike."""
 
 

@@ -157,7 +157,11 @@ def preview_command(
     baked: Annotated[Path, typer.Argument(help="A bake.")],
     out: Out,
     frames: Annotated[
-        str | None, typer.Option(help="FIRST:LAST in time codes, of a strip also :STEP; all if left out.")
+        str | None,
+        typer.Option(
+            help="FIRST:LAST in time codes, of a strip also :STEP; a strip shows six of more than twelve.",
+            show_default="six of all for a strip, all for a clip",
+        ),
     ] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of one picture in pixels.")] = None,
     view: Annotated[float, typer.Option(help="Degrees from the face to the character's left.")] = 32.0,

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.flags import flag
 from neuralocks_core.preview import pictures as drawing
 from neuralocks_core.preview.film import AZIMUTH
@@ -17,7 +18,7 @@ from ..border.amounts import check_number
 from ..border.damage import names_damage
 from ..border.stage_files import open_stage
 from ..border.stopping import deferred
-from ..border.time_codes import time_codes
+from ..border.time_codes import parse_frames, time_codes
 from ..border.units import Border
 from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
@@ -49,19 +50,18 @@ def preview(
         baked: path of the bake, or a `Baked` already read.
         path: .png for a strip of pictures, .mp4 or .gif for a clip.
         grooms, skeleton, head: as for `bake`.
-        frames: `FIRST:LAST[:STEP]` in time codes: what a strip shows, where more than twelve are six of them, or how far a clip
-            goes; all if left out.
-        size: width and height of one picture in pixels.
+        frames: in time codes, for a strip `FIRST:LAST[:STEP]`, of which it shows six if they are more than twelve, for a clip
+            `FIRST:LAST`; if left out, a strip shows six of all frames, a clip all.
+        size: width and height of one picture in pixels, such as (440, 620).
         view: where the camera is: degrees from the face to the character's left.
         turntable: whether the camera goes round once.
         tell: called with the note on characters whose hair is not drawn.
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the file is not a bake, or the picture cannot be made.
+        NeuralocksError: the file is not a bake, an argument cannot be used, or the picture cannot be made.
     """
-    for side in size or ():
-        check_number("--size", side, *SIDES, whole=True)
+    _check_size(size)
     check_number("--view", view, -360, 360)
     turntable = flag("--turntable", turntable)
     if isinstance(baked, Baked):
@@ -73,7 +73,7 @@ def preview(
             scene,
             path,
             size=size,
-            frames=_samples(frames, scene.times, border),
+            frames=_samples(frames, scene.times, border, as_path(path, "path")),
             azimuth=view,
             turntable=turntable,
             rate=min(border.rate / border.frame, 30.0),
@@ -82,10 +82,22 @@ def preview(
         )
 
 
-def _samples(frames: str | None, times: np.ndarray, border: Border) -> np.ndarray | None:
+def _check_size(size) -> None:
+    if size is None:
+        return
+    if not isinstance(size, tuple | list) or len(size) != 2:
+        raise NeuralocksError(f"--size {size!r}: must be width and height in pixels, such as (440, 620)")
+    for side in size:
+        check_number("--size", side, *SIDES, whole=True)
+
+
+def _samples(frames: str | None, times: np.ndarray, border: Border, path: Path) -> np.ndarray | None:
     """Numbers of the samples at `times` [s] that are nearest to the frames asked for, ascending; None for all."""
     if frames is None:
         return None
+    clip = path.suffix.lower() in drawing.CLIPS
+    if clip and isinstance(frames, str) and parse_frames(frames, border.frame)[2] != border.frame:
+        raise NeuralocksError(f"--frames {frames}: a clip plays in real time; leave out STEP, or write a strip, a .png")
     first, last = border.time_codes(times[[0, -1]])
     wanted = np.array(time_codes(frames, first, last, frame=border.frame))
     if wanted[0] < first - border.frame / 2 or wanted[-1] > last + border.frame / 2:

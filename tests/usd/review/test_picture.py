@@ -88,6 +88,18 @@ def test_frames_that_the_bake_lacks_and_sizes_that_nobody_draws_are_refused(hair
         picture.preview(hair, tmp_path / "hair.png", frames="1:7")
     with pytest.raises(NeuralocksError, match="--size 90000: must be a whole number from 16 to 4096"):
         picture.preview(hair, tmp_path / "hair.png", size=(64, 90000))
+    for size in ((60,), 60, "60x60", (60, 60, 60)):
+        with pytest.raises(NeuralocksError, match=r"--size .*: must be width and height in pixels"):
+            picture.preview(hair, tmp_path / "hair.png", size=size)
+
+
+def test_a_clip_has_no_step(hair, tmp_path, monkeypatch):
+    """It plays in real time; the step was dropped without a word."""
+    monkeypatch.setattr(picture.drawing, "render", lambda scene, path, *, frames, **_: frames)
+    for name in ("hair.gif", "hair.MP4"):
+        with pytest.raises(NeuralocksError, match="--frames 6:12:3: a clip plays in real time; leave out STEP"):
+            picture.preview(hair, tmp_path / name, frames="6:12:3")
+        assert len(picture.preview(hair, tmp_path / name, frames="6:12:1")) == 7
     with pytest.raises(NeuralocksError, match="--view nan"):
         picture.preview(hair, tmp_path / "hair.png", view=float("nan"))
 
