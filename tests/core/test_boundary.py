@@ -77,10 +77,10 @@ def test_spin_is_read_in_head_axes():
 
 
 def test_a_turn_beyond_what_was_learned_is_cut_off():
-    """It is sampled finely, or it would be taken for a slower turn the other way."""
+    """At 25 rad/s, as README.md says. It is sampled finely, or it would be taken for a slower turn the other way."""
     clip = moved(np.arange(0, 2, 1 / 240), None, turning(60.0))
     assert history(BoundarySampler(SPEC, person(), clip).vectors([1.5]))[0, :, 3:6] == pytest.approx(
-        np.tile([0, BoundarySampler.SPIN_LIMIT, 0], (30, 1)), abs=1e-4
+        np.tile([0, 25.0, 0], (30, 1)), abs=1e-4
     )
 
 
@@ -222,16 +222,18 @@ def test_a_cut_counts_from_its_own_sample_on_however_its_time_was_rounded():
     assert cut.vectors(at) == pytest.approx(alone.vectors(at), abs=1e-6)
 
 
-@pytest.mark.parametrize(("linear", "limit"), [("gravity", "GRAVITY_LIMIT"), ("velocity", "SPEED_LIMIT")])
+@pytest.mark.parametrize(("linear", "limit"), [("gravity", 6.0), ("velocity", 25.0)])
 def test_a_leap_within_a_loop_is_bounded(linear, limit):
-    """A loop has no cuts, and its path stays as it is, or its seam would not fit: what is felt of a jump is limited."""
+    """A loop has no cuts, and its path stays as it is, or its seam would not fit: what is felt of a jump is limited, to 6 g as
+    README.md says, or to 25 m/s.
+    """
     spec = BoundarySpec(bins=(1,) * 30, taper=0.0, linear=linear)
     clip = moved(
         np.arange(49) / 24, lambda t: np.stack([40.0 * np.exp(-400 * (t - 1) ** 2), 0 * t, 0 * t], -1), loop=True
     )
     assert softened(clip, person(), 6.0, SPEC.dt) is clip
     felt = np.linalg.norm(history(BoundarySampler(spec, person(), clip).vectors([1.2]), spec)[0, :, :3], axis=-1)
-    assert felt.max() == pytest.approx(getattr(BoundarySampler, limit), rel=1e-5)
+    assert felt.max() == pytest.approx(limit, rel=1e-5)
 
 
 def test_a_teleport_is_bounded():

@@ -9,7 +9,7 @@ from neuralocks_core.errors import NeuralocksError
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
-from ..shots import Recipe, add_curves, write_shot
+from ..shots import HEAD, POSITIONS, Recipe, add_curves, write_shot
 
 
 def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_path):
@@ -37,6 +37,18 @@ def test_curves_out_of_every_heads_reach_are_no_hair_unless_they_are_named(tmp_p
     with pytest.raises(NeuralocksError, match="/Set/Grass.*not taken for hair"):
         read_shot(path)
     assert len(inspect(path)["stops"]) == 1
+
+
+@pytest.mark.parametrize(("away", "hair"), [(0.8, True), (1.2, False)])
+def test_a_head_has_a_metre_of_reach(tmp_path, away, hair):
+    """So has that of a character whose trunk is shorter."""
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(strands=4))))
+    assert POSITIONS[HEAD][1] - POSITIONS[0][1] < 0.8
+    roots = POSITIONS[HEAD] + [away, 0, 0] + np.random.default_rng(0).uniform(-0.01, 0.01, (9, 1, 3))
+    add_curves(stage, "/Set/Tuft", np.concatenate([roots, roots + [0, 0.2, 0]], axis=1))
+    stage.GetRootLayer().Save()
+    grooms = [item.path for item in read_shot(stage.GetRootLayer().realPath).grooms]
+    assert grooms == ["/Hero/Hair", "/Set/Tuft"][: 1 + hair]
 
 
 def test_empty_curves_stop_nothing_beside_a_groom(tmp_path):
