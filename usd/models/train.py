@@ -52,7 +52,7 @@ def train(
 
     Args:
         character: USD file.
-        grooms: USD files, or "library".
+        grooms: USD files, names of styles of the library (`neuralocks_core.hairstyles.STYLES`), or "library" for all of these.
         motion: BVH or USD files.
         out: `.neuralocks` file to write.
         settings: fields of `training.regression_options.RegressionOptions`, or of `training.moment_options.SelfSupervisedOptions`;

@@ -9,6 +9,7 @@ from pxr import Usd, UsdSkel
 from neuralocks_core.animation.random_motion import check_weights
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.motion import Clip
@@ -19,7 +20,7 @@ from neuralocks_core.training.rollouts import LEAST, TrainingScene
 from ..assets.grow import Barber
 from ..border.damage import names_damage
 from ..border.placement import Placement
-from ..border.stage_files import open_stage
+from ..border.stage_files import check_file, open_stage
 from ..border.units import Border
 from ..border.values import as_names
 from ..shot.alike import one_person
@@ -78,16 +79,17 @@ def training_scene(
         **settings: further fields of TrainingScene.
 
     Raises:
-        NeuralocksError: a file cannot be used, there is no hair, variations are asked for without the library, or too many, or an unknown
+        NeuralocksError: a file is missing or cannot be used, there is no hair, variations are asked for without the library, or too many, or an unknown
             gesture.
     """
     grooms, motion = ([words] if isinstance(words, str | Path) else words for words in (grooms, motion))
     if not 0 <= variations <= MOST_VARIATIONS:
         raise NeuralocksError(f"--variations {variations}: must be from 0 to {MOST_VARIATIONS}")
-    if variations and not any(source == LIBRARY or source in STYLES for source in grooms):
+    if variations and not any(map(_is_style, grooms)):
         raise NeuralocksError(
             f"--variations {variations}: apply to the library's styles; add --groom {LIBRARY}, or leave it out"
         )
+    _check_words(grooms, motion)
     weights = check_weights(gestures or {})
     rigs = read_rigs(character, skeleton, head, joints)
     rig = rigs[0]
@@ -98,7 +100,7 @@ def training_scene(
     if styles := [style for style in STYLES if style in grooms or LIBRARY in grooms]:
         found += _library(rig.character, styles, seed, variations, progress or silent)
     for source in grooms or [str(character)]:
-        if source != LIBRARY and source not in STYLES:
+        if not _is_style(source):
             found += _file(source, rig, head, joints, notes)
     clips = tuple(read_clip(path, rig.character, notes) for path in motion)
     scene = TrainingScene(rig.character, tuple(found), clips, seed=seed, gestures=weights, **settings)
@@ -110,6 +112,21 @@ def training_scene(
     if tell:
         tell(list(dict.fromkeys(notes)))
     return scene
+
+
+def _is_style(source: str) -> bool:
+    return source == LIBRARY or source in STYLES
+
+
+def _check_words(grooms, motion) -> None:
+    """Refuse what is not there before the first style grows, which takes seconds each."""
+    for source in grooms:
+        if not _is_style(source) and not as_path(source, "grooms").exists():
+            raise NeuralocksError(
+                f"{source}: is neither a file nor a style; check the path, or use one of {LIBRARY}, {', '.join(STYLES)}"
+            )
+    for path in motion:
+        check_file(as_path(path, "motion"))
 
 
 @names_damage

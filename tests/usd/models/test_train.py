@@ -56,6 +56,20 @@ def test_what_is_named_is_taken_or_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("words", "fact"),
+    [
+        ({"grooms": ["bob", "bop"]}, "^bop: is neither a file nor a style; .* use one of library, .*bob"),
+        ({"grooms": ["bob"], "motion": ["walk.bvh"]}, "^walk.bvh: no such file"),
+    ],
+)
+def test_every_word_is_looked_at_before_a_style_grows(words, fact, tmp_path):
+    with pytest.raises(NeuralocksError, match=fact):
+        training_scene(BODY, **words, progress=lambda *_: pytest.fail("grows"))
+    with pytest.raises(NeuralocksError, match=fact):
+        train(BODY, words["grooms"], words.get("motion", []), tmp_path / "own.neuralocks", {})
+
+
+@pytest.mark.parametrize(
     "grooms, begin, taken",
     [
         (["coils"], "shipped", "strands_coily"),
