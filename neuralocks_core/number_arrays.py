@@ -7,13 +7,14 @@ from neuralocks_core.errors import NeuralocksError
 
 
 def number_array(name: str, given, wanted: str, kind=np.float64) -> np.ndarray:
-    """The numbers that are given for an argument, as an array of `kind`, a floating-point type; not copied if they are one already.
-    What is too large for it becomes infinite.
+    """The numbers that are given for an argument, as an array; not copied if they are one of this kind already. What is too large for it
+    becomes infinite.
 
     Args:
         name: of the argument.
         given: an array, or what numpy makes one of.
         wanted: its shape and unit, for the message; the shape itself is not checked.
+        kind: of the result, a floating-point type.
 
     Raises:
         NeuralocksError: these are not numbers, or rows of different lengths.

@@ -136,15 +136,14 @@ def inverses(transforms: np.ndarray) -> np.ndarray:
     linear = transforms[..., :3, :3]
     a, b, c = (linear[..., column] for column in range(3))
     result = np.zeros_like(transforms)
-    result[..., :3, :3] = (
-        np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=-2) / volumes(linear)[..., None, None]
-    )
+    result[..., :3, :3] = np.stack([cross(b, c), cross(c, a), cross(a, b)], axis=-2) / volumes(linear)[..., None, None]
     result[..., :3, 3:] = -result[..., :3, :3] @ transforms[..., :3, 3:]
     result[..., 3, 3] = 1
     return result
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products (..., 3) of vectors (..., 3), written out so that no version of numpy changes their last bits."""
     (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 

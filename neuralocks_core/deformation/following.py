@@ -66,6 +66,7 @@ class Following:
 
         Args:
             displacement: (n, K, 3) float32 [m] of the network's vertices.
+            start: number of the first of these n strands.
             points: (P', 3) float32 [m] own vertices at rest.
         """
         result = np.empty_like(points)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from neuralocks_core.rotation import cross
 from neuralocks_core.sums import dot
 
 
@@ -32,8 +33,8 @@ def turned(
     turn = turns[strand, segment]
     turn += share * (turns[strand, segment + 1] - turn)
     # A quaternion of any length turns r by 2 (w q x r + q x (q x r)) / |q|^2: not at all if q is zero.
-    once = _cross(turn[..., :3], beside)
-    twice = _cross(turn[..., :3], once)
+    once = cross(turn[..., :3], beside)
+    twice = cross(turn[..., :3], once)
     twice += once * turn[..., 3:]
     twice *= (np.float32(2.0) / np.maximum(dot(turn, turn), np.float32(1e-12)))[..., None]
     return moved + twice
@@ -54,13 +55,7 @@ def _turns(edges: np.ndarray, steps: np.ndarray) -> np.ndarray:
     now = edges + steps
     # Halfway between no turn and twice the turn; a segment turned back onto itself has no smallest rotation.
     real = np.sqrt(dot(edges, edges) * dot(now, now)) + dot(edges, now)
-    segment = np.concatenate([_cross(edges, now), real[..., None]], axis=-1)
+    segment = np.concatenate([cross(edges, now), real[..., None]], axis=-1)
     segment /= np.sqrt(np.maximum(dot(segment, segment), np.float32(1e-30)))[..., None]
     middle = (segment[:, :-1] + segment[:, 1:]) * np.float32(0.5)
     return np.concatenate([segment[:, :1], middle, segment[:, -1:]], axis=1)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of vectors (..., 3)."""
-    (x, y, z), (u, v, w) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A UsdSkel skeleton and its animation as arrays in stage space: names, bind pose, and posed joints at any time.
 
-Evaluated here rather than by a UsdSkelSkeletonQuery, which exists only below a SkelRoot and takes one time at a time; a
-test checks that both agree.
+Evaluated here: a UsdSkelSkeletonQuery exists only below a SkelRoot and takes one time at a time. A test checks that both agree.
 """
 
 from functools import cached_property

@@ -80,7 +80,8 @@ def train_dynamic(
     Args:
         rig: chains and body.
         material: constants; `damping` counts here.
-        seconds: time for the regression, after the simulations; `steps`, if given, replaces it.
+        seconds: time for the regression, after the simulations.
+        steps: of the regression, in place of its time.
         hidden: width of both layers, unless `begin` decides it.
         seed: decides clips and initial weights.
         clips: number of random motions to simulate.

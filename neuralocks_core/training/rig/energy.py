@@ -27,6 +27,7 @@ class RigEnergy(torch.nn.Module):
     Args:
         rig: chains and skinned vertices.
         material: constants.
+        dtype: of the computation.
     """
 
     def __init__(self, rig: HairRig, material: RigMaterial, dtype=torch.float32):

@@ -55,7 +55,8 @@ def train_static(
     Args:
         rig: chains, hair vertices and body.
         material: constants of the energy.
-        seconds: time to train; `steps`, if given, replaces it and makes the result repeatable.
+        seconds: time to train.
+        steps: in place of the time; the result is then repeatable.
         hidden: width of both layers (the paper's 16), unless `begin` decides it.
         seed: decides poses and initial weights.
         batch: poses per step.

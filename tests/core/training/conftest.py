@@ -1,7 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small budgets for the tests of whole trainings."""
+"""Small scenes and budgets for the tests of trainings."""
 
 import pytest
+
+from tests.core.rigs import person, straight_hair
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """One head with a little straight hair."""
+    from neuralocks_core.training.rollouts import TrainingScene  # needs torch: modules without it are skipped
+
+    return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
 
 
 @pytest.fixture

@@ -11,16 +11,10 @@ from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.metrics import motion_error
 from neuralocks_core.motion import Clip
 from neuralocks_core.smooth_motion import SmoothMotion
-from tests.core.rigs import person, straight_hair
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
-from neuralocks_core.training.rollouts import PREROLL, RolloutMaker, TrainingScene
-
-
-@pytest.fixture(scope="module")
-def scene():
-    return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
+from neuralocks_core.training.rollouts import PREROLL, RolloutMaker
 
 
 def captured_of(scene, clip, count):

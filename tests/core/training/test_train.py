@@ -12,7 +12,7 @@ from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import body_measures
 from neuralocks_core.network_sizes import CODE
-from tests.core.rigs import person, straight_hair
+from tests.core.rigs import person
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
@@ -24,14 +24,9 @@ from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression import RolloutBank
 from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene, held_out_split, in_steps, kept_from_training
+from neuralocks_core.training.rollouts import RolloutMaker, held_out_split, in_steps, kept_from_training
 from neuralocks_core.training.train import train_strands
 from neuralocks_core.training.work import claimed
-
-
-@pytest.fixture(scope="module")
-def scene():
-    return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
 
 
 def test_a_rollout_depends_on_its_number_alone(scene, tmp_path):
