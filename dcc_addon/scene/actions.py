@@ -8,7 +8,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from . import rotations
+from . import alone, rotations
 from .animated import animated
 from .lookup import identified, identity
 from .relations import found_anew
@@ -22,6 +22,8 @@ HAIR = TRACK, BEFORE, TRACK + OVERRIDE, BEFORE + OVERRIDE
 """All names of these tracks."""
 KEPT = "neuralocks_rotations"
 """Property of the action that holds the hair bones' earlier rotations."""
+ALONE = "neuralocks_alone"
+"""Property of the same action that holds how the artist's action was set; see `alone`."""
 OF = "neuralocks_armature"
 """Property of both actions that names the armature: it finds them when their tracks were deleted by hand."""
 LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
@@ -58,7 +60,7 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     below = _action(armature, f"{armature.name} Before Hair", modes, frames[:needed], own[:needed])
     _strip(data, BEFORE + ending, below)
     action = _action(armature, f"{armature.name} Hair", modes, frames, turns)
-    action[KEPT] = before
+    action[KEPT], action[ALONE] = before, alone.keep_alone(data, HAIR)
     action[OF] = below[OF] = armature.name
     _strip(data, TRACK + ending, action)
     return action
@@ -154,7 +156,7 @@ def remove(armature) -> str:
     orphans = _orphans(armature)
     muted = _take_off(armature)
     for action in reversed(orphans):  # the oldest bake knows the artist's own rotations
-        rotations.give_back(armature, action.get(KEPT, ""), keyed=True)
+        _give_back(armature, action, keyed=True)
         _drop(action)
     return muted
 
@@ -170,9 +172,14 @@ def _take_off(armature) -> str:
         else:
             armature.animation_data.nla_tracks.remove(track)
     for action in actions:
-        rotations.give_back(armature, action.get(KEPT, ""))
+        _give_back(armature, action)
         _drop(action)
     return muted
+
+
+def _give_back(armature, action, keyed: bool = False) -> None:
+    rotations.give_back(armature, action.get(KEPT, ""), keyed)
+    alone.give_back(armature.animation_data, action.get(ALONE, ""), HAIR)
 
 
 def _drop(action) -> None:

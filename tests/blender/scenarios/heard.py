@@ -105,6 +105,50 @@ def keys_that_do_not_play(folder: Path) -> None:
         bakes()
 
 
+def action_beside_keys(folder: Path) -> None:
+    """An action that plays alone keeps moving the body as before beside baked keys, however its influence, extrapolation and blending
+    are set, which Blender overlooks without strips; removing the keys sets it as it was, unless the artist has set it since.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig, (1, 16))
+    give_bone_model(rig, folder)
+    data, body = rig.animation_data, [name for name, *_ in scenes.BONES]
+    names, quiet = ("action_influence", "action_extrapolation", "action_blend_type"), (0.5, "NOTHING", "ADD")
+    muted = data.nla_tracks.new()
+    muted.strips.new("Other", 1, data.action)
+    muted.mute = True
+
+    def put(*values) -> None:
+        for name, value in zip(names, values, strict=True):
+            setattr(data, name, value)
+
+    def same() -> bool:
+        found = {frame: bones_at(rig, frame, body) for frame in still}
+        return max(apart(found[frame], still[frame]) for frame in still) < 1e-6
+
+    def is_put(*values) -> bool:
+        return tuple(getattr(data, name) for name in names) == values
+
+    put(*quiet)
+    still = {frame: bones_at(rig, frame, body) for frame in (2, 9, 22)}
+    for _ in range(2):  # the second time in place of the first
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        assert same()
+    for track in list(data.nla_tracks)[1:]:  # by hand
+        data.nla_tracks.remove(track)
+    for since in ((), (0.25, "HOLD", "REPLACE")):
+        assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+        put(*(since or (1.0, "HOLD", "REPLACE")))
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+        assert same() and is_put(*(since or quiet))
+
+    muted.mute = False
+    still = {frame: bones_at(rig, frame, body) for frame in still}
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    assert same() and is_put(*since), "it plays beside the artist's own strips as set"
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"} and is_put(*since)
+
+
 def baked_by_blender(folder: Path) -> None:
     """What Blender's own Bake Action makes of live hair bones keeps playing when Live is off, whether in Euler angles, which it did
     not bake, or not; a bone that also has keys in its own mode gets that mode back.
