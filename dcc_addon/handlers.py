@@ -76,8 +76,8 @@ def on_update(scene, graph):
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
         session.wanting = session.wanting or bool(session.failed)
         session.failed.clear()
-    bodies = {body for name in names & session.rigs.keys() for body in session.rigs[name].bodies}
-    if (names | bodies) & objects.keys():
+    moving = frozenset(names).union(*(session.rigs[name].moved_by for name in names & session.rigs.keys()))
+    if moving & objects.keys():
         background.doubt()
     if names & objects.keys() or any(_edited(o.original) for o in objects.values()):
         live.update(scene, graph)
@@ -145,6 +145,7 @@ def before_render(scene, *_):
     """A render must be right: sample now what is out of date, even if only the drawn pose shows it, and print which hair will not
     move on the console, which is all that a render farm keeps.
     """
+    session.misrendered.clear()
     for drawn in drawn_with(scene):
         with working_in(drawn, layer_shown(drawn)):
             _make_ready(drawn)

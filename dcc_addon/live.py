@@ -105,7 +105,7 @@ def show_rest(scene) -> None:
 
 def forget_gone() -> None:
     """Drop messages about objects that were renamed or deleted: another object may get such a name."""
-    for told in (session.messages, session.cards):
+    for told in (session.messages, session.misrendered, session.cards):
         for name in [name for name in told if find(name) is None]:
             del told[name]
 

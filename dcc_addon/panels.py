@@ -86,6 +86,8 @@ def _motion(layout, armature, scene) -> None:
     if sampled is not None:
         for text in (*(() if character.loop else sampled.leaps), *sampled.bodies_off, *sampled.hairs_off.values()):
             words(layout, text, "INFO")
+    if text := session.misrendered.get(armature.name_full):
+        words(layout, text, "ERROR")
     message(layout, armature.name_full)
 
 

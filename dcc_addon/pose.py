@@ -39,6 +39,8 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
             _tell_late(armature.name_full)
         elif moved:
             sampled.stale = session.wanting = True
+            if graph.mode == "RENDER":
+                _tell_misrendered(armature.name_full, scene)
     drawn = to_core(sampled.motion.metres_per_unit) @ world
     for joint in {sampled.character.head, *sampled.carriers.values()}:
         drawn[joint] = as_carried(drawn[joint], armature.name_full)
@@ -58,6 +60,18 @@ def _tell_late(name: str) -> None:
     if session.messages.get(name) != message:
         session.messages[name] = message
         print(f"Neuralocks: {message}")
+
+
+def _tell_misrendered(name: str, scene) -> None:
+    """Say, also on the console, that a render shows a character otherwise than it was sampled, of which nothing told before: its hair
+    remembers the motion of before, also in later frames that are as they were.
+    """
+    if name not in session.misrendered:
+        session.misrendered[name] = (
+            f"{name}: hair may be wrong in the last render, from frame {shown_frame(scene):g} on, where the character moves otherwise "
+            "than when its motion was sampled; render again, and if that does not help, bake the simulation that moves it"
+        )
+        print(f"Neuralocks: {session.misrendered[name]}")
 
 
 def _hair(armature, sampled) -> np.ndarray:

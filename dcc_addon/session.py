@@ -57,6 +57,8 @@ class SampledRig:
     """The setup that moves the rig; see `scene.sampling.rigging_of`."""
     posture: int = 0
     """The unkeyed pose; see `scene.sampling.posture_of`."""
+    moved_by: frozenset[str] = frozenset()
+    """Names of the objects that moved it; see `scene.sampling.moved_by`."""
 
     carriers: dict[str, int] = field(default_factory=dict)
     """Joints below the head that carry hair objects, by name: the jaw of a beard. All others ride on the head."""
@@ -117,6 +119,8 @@ class Session:
     weights: dict[str, tuple[tuple, np.ndarray]] = field(default_factory=dict)
     """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
     messages: dict[str, str] = field(default_factory=dict)
+    misrendered: dict[str, str] = field(default_factory=dict)
+    """What the last render showed wrongly, by armature name, until the next one begins."""
     trained: tuple[str, bool] | None = None
     """How the last training ended, and whether that is good news."""
     trained_notes: list[str] = field(default_factory=list)

@@ -49,15 +49,15 @@ def read(mesh_object, armature) -> BodyArrays:
     groups = tuple(group.name for group in mesh_object.vertex_groups)
     weights, shapes, keys = _weights(mesh, groups), {}, mesh.shape_keys
     if keys and len(keys.key_blocks) > 1:
-        basis = _coordinates(keys.reference_key)
+        basis = coordinates(keys.reference_key)
         points = basis
         for block in keys.key_blocks:
             if block != keys.reference_key:
                 if keys.use_relative:
-                    offsets = _coordinates(block) - _coordinates(block.relative_key or block)
+                    offsets = coordinates(block) - coordinates(block.relative_key or block)
                     shapes[block.name] = offsets * _mask(block, groups, weights, len(points))
                 else:  # Blender blends the keys as they are, without their groups
-                    shapes[block.name] = _coordinates(block) - basis
+                    shapes[block.name] = coordinates(block) - basis
     body = BodyArrays(mesh_object.name_full, points, triangles, groups, weights, shapes)
     for modifier in _before_armature(mesh_object):
         if modifier.type == "MIRROR" and modifier.show_render:
@@ -189,8 +189,8 @@ def vertices(mesh) -> np.ndarray:
     return points
 
 
-def _coordinates(block) -> np.ndarray:
-    """Points (V, 3) of a shape key."""
+def coordinates(block) -> np.ndarray:
+    """Points (V, 3) of a shape key of a mesh or a lattice."""
     elements = getattr(block, "points", block.data)  # as a block, fifty times faster; not before Blender 4.1
     values = np.empty((len(elements), 3), np.float32)
     elements.foreach_get("co", values.ravel())

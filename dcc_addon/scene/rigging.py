@@ -10,51 +10,45 @@ import numpy as np
 
 from .actions import HAIR, as_before
 from .animated import animated, strips_of
+from .settings import as_set, objects_named, settings_of
+from .shapes import shape
 from .unkeyed import PLACE, value_of
 
 REST = {"matrix_local": 16, "use_inherit_rotation": 1, "use_local_location": 1, "use_deform": 1}
 IK = ("ik_stretch", *(f"ik_{end}_{axis}" for end in ("min", "max", "stiffness") for axis in "xyz"))
 LIMITED = tuple(f"{what}_{axis}" for what in ("use_ik_limit", "lock_ik") for axis in "xyz")
 """Settings of bones that posing does not change."""
-CURVE = (
-    "dimensions",
-    "resolution_u",
-    "twist_mode",
-    "twist_smooth",
-    "use_path",
-    "use_path_clamp",
-    "path_duration",
-    "eval_time",
-)
-POINT = ("co", "handle_left", "handle_right", "tilt", "radius")
-"""What an object that moves along a curve reads from its points."""
 DELTA = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
 """What adds to an object's own channels, PLACE."""
-NOT_SET = {"name", "active", "select", "show_expanded", "strip_time", "influence"}
-"""Settings that only affect how something is shown, and those of strips that Blender itself writes."""
-_written: dict[type, list[str]] = {}
 
 
 def rigging(things) -> int:
     """A number that changes when the setup of one of these objects, or of one that it depends on, changes."""
-    return zlib.crc32(repr([_object(thing) for thing in _reached(things)]).encode())
+    others = reached(things)[len(things) :]
+    found = [*map(_object, things), *([*_object(thing), *_modifiers(thing)] for thing in others)]
+    return zlib.crc32(repr(found).encode())
 
 
 def posture(things) -> int:
     """A number that changes when one of these objects, or one that it depends on, is placed or posed differently by values that no
-    animation writes: these count in all frames. Hair bones count as they are without the hair's motion.
+    animation writes: these count in all frames. Hair bones count as they are without the hair's motion; the shape counts of what they
+    depend on, but not their own.
     """
-    return zlib.crc32(repr([_held(thing) for thing in _reached(things)]).encode())
+    others = reached(things)[len(things) :]
+    found = [*map(_held, things), *([*_held(thing), *shape(thing)] for thing in others)]
+    return zlib.crc32(repr(found).encode())
 
 
-def _reached(things) -> list:
-    """These objects, and those on whose place or pose they, or the shape of a body, depend."""
+def reached(things) -> list:
+    """These objects, and then those on whose place, pose or shape they depend. Modifiers of hair move no object."""
     found = {thing.name_full: thing for thing in things}
     waiting = list(found.values())
     while waiting:
         thing = waiting.pop()
         bones = thing.pose.bones if thing.pose else ()
-        others = [thing.parent, *(m.mirror_object for m in thing.modifiers if m.type == "MIRROR")]
+        others = [thing.parent]
+        if thing.type != "CURVES":
+            others += [other for modifier in thing.modifiers for other in objects_named(modifier)]
         for constraint in [*thing.constraints, *(c for bone in bones for c in bone.constraints)]:
             others += [getattr(constraint, name, None) for name in ("target", "pole_target")]
             others += [target.target for target in getattr(constraint, "targets", ())]
@@ -114,8 +108,6 @@ def _held(thing) -> list:
             found.append(zlib.crc32(values))
         for bone, start in zip(bones, starts, strict=True):
             found += [_mode(bone, start, moving, live.get(bone.name, {})), _lists(bone)]
-    if thing.type == "CURVE":
-        found += _shape(thing.data)
     return found
 
 
@@ -124,22 +116,6 @@ def _mode(owner, start: str, moving: set[str], live=()) -> str:
     if f"{start}rotation_mode" in moving:
         return ""
     return live["rotation_mode"] if "rotation_mode" in live else owner.rotation_mode
-
-
-def _shape(curve) -> list:
-    """The shape of a curve, except what animation writes."""
-    moving = animated(curve.animation_data)
-    found = _values(curve, [name for name in CURVE if name not in moving])
-    if not any(path.startswith("splines") for path in moving):
-        for spline in curve.splines:
-            found += _values(spline, _settings(spline))
-            for point in (*spline.points, *spline.bezier_points):
-                found.append([tuple(value) if hasattr(value, "__len__") else value for value in _of(point)])
-    return found
-
-
-def _of(point) -> list:
-    return [getattr(point, name) for name in POINT if hasattr(point, name)]
 
 
 def _lists(owner) -> list:
@@ -180,19 +156,29 @@ def _numbers(owner, start: str, moving: set[str]) -> list:
 
 
 def _constraint(constraint, start: str, moving: set[str]) -> list:
-    still = [name for name in (*_settings(constraint), "influence") if start + name not in moving]
+    still = [name for name in (*settings_of(constraint), "influence") if start + name not in moving]
     several = [(t.target and t.target.name_full, t.subtarget) for t in getattr(constraint, "targets", ())]
-    return [constraint.name, constraint.type, several, *_values(constraint, still)]
+    return [constraint.name, constraint.type, several, *as_set(constraint, still)]
+
+
+def _modifiers(thing) -> list:
+    """Modifiers, without what animation writes."""
+    moving, found = animated(thing.animation_data), []
+    for modifier in thing.modifiers:
+        start = f'modifiers["{_quoted(modifier)}"].'
+        still = [name for name in settings_of(modifier) if start + name not in moving]
+        found += [modifier.name, modifier.type, *as_set(modifier, still)]
+    return found
 
 
 def _animated_by(data) -> list:
     """Action, strips and drivers."""
-    found = _values(data, _settings(data))
+    found = as_set(data, settings_of(data))
     for track in data.nla_tracks:
         if track.name not in HAIR or track.is_solo:
             found += [track.name, track.mute, track.is_solo]
     for strip in strips_of(data, HAIR):
-        found += [strip.name, *_values(strip, _settings(strip)), *(_keys(curve) for curve in strip.fcurves)]
+        found += [strip.name, *as_set(strip, settings_of(strip)), *(_keys(curve) for curve in strip.fcurves)]
     for curve in data.drivers:
         if _of_hair(curve):
             continue
@@ -200,7 +186,7 @@ def _animated_by(data) -> list:
         found += [curve.data_path, curve.array_index, curve.mute, _keys(curve), driver.type, driver.expression]
         for variable in driver.variables:
             found += [variable.name, variable.type]
-            found += [part for target in variable.targets for part in _values(target, _settings(target))]
+            found += [part for target in variable.targets for part in as_set(target, settings_of(target))]
     return found
 
 
@@ -211,35 +197,8 @@ def _of_hair(curve) -> bool:
 
 
 def _keys(curve) -> list:
-    modifiers = [[modifier.type, *_values(modifier, _settings(modifier))] for modifier in curve.modifiers]
+    modifiers = [[modifier.type, *as_set(modifier, settings_of(modifier))] for modifier in curve.modifiers]
     return [*modifiers, *((*key.co, key.interpolation) for key in curve.keyframe_points)]
-
-
-def _settings(thing) -> list[str]:
-    """Names of the settings of a kind of thing."""
-    kind = type(thing)
-    if kind not in _written:
-        _written[kind] = [
-            p.identifier
-            for p in kind.bl_rna.properties
-            if p.identifier not in NOT_SET and not p.is_readonly and p.type != "COLLECTION"
-        ]
-    return _written[kind]
-
-
-def _values(thing, names) -> list:
-    found = []
-    for name in names:
-        value = getattr(thing, name)
-        if isinstance(value, bpy.types.ID):
-            value = value.name_full
-        elif isinstance(value, bpy.types.bpy_prop_array):
-            value = value[:]
-        elif isinstance(value, set):
-            value = sorted(value)
-        if not isinstance(value, bpy.types.bpy_struct):
-            found.append(value)
-    return found
 
 
 def _quoted(named) -> str:

@@ -28,7 +28,7 @@ from .layers import graph_of, layer_of, working_in
 from .lookup import find, named
 from .placing import world
 from .relations import found_anew
-from .rigging import posture, rigging
+from .rigging import posture, reached, rigging
 from .stepping import step, stepping
 from .watched import watched
 
@@ -82,14 +82,24 @@ def key_of(armature, scene) -> tuple:
 
 def rigging_of(armature, scene) -> int:
     """A number that changes when the setup that moves this armature, its hair or its bodies changes."""
-    return rigging([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)])
+    return rigging(_moved_together(armature, scene))
 
 
 def posture_of(armature, scene) -> int:
     """A number that changes when unkeyed values pose this armature, or what it depends on, differently; hair bones count as they
     are without the hair's motion.
     """
-    return posture([armature, *hairs_of(armature, scene), *bodies_of(armature, scene)])
+    return posture(_moved_together(armature, scene))
+
+
+def moved_by(armature, scene) -> frozenset[str]:
+    """Names of the objects that move this armature, its hair or its bodies, with itself and the bodies."""
+    found = reached(_moved_together(armature, scene))
+    return frozenset(thing.name_full for thing in found if thing.type != "CURVES")
+
+
+def _moved_together(armature, scene) -> list:
+    return [armature, *hairs_of(armature, scene), *bodies_of(armature, scene)]
 
 
 def in_slices(context, armature, seconds: float = math.inf) -> Iterator[tuple[int, int]]:
@@ -140,7 +150,8 @@ class _Recording:
         self._bodies = [body.name_full for body in bodies_of(armature, self._scene)]
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
         self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
-        self._posture, self._edits = posture_of(armature, self._scene), session.edits
+        self._posture, self._moved_by = posture_of(armature, self._scene), moved_by(armature, self._scene)
+        self._edits = session.edits
         self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
         self._rate = self._scene.render.fps / self._scene.render.fps_base
         self._unit = self._scene.unit_settings.scale_length
@@ -280,6 +291,7 @@ class _Recording:
             own=self._own,
             rigging=self._rigging,
             posture=self._posture,
+            moved_by=self._moved_by,
             hairs_off=riding.strays_told(
                 [hair for name in hairs if name not in carriers and (hair := find(name)) is not None],
                 rig,
