@@ -12,14 +12,14 @@ from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
 from .scene import imported
 from .scene.actions import has_keys
-from .scene.attach import has_cache, stretched_since
+from .scene.attach import has_cache, retimed_since
 from .scene.particles import waiting
 from .services.panel_errors import for_the_panel
 from .services.remaining import in_words
 from .services.sliders import SLIDERS
 from .session import session
 
-STRETCHED = "Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
+RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
 _findings: dict[tuple, tuple[list, str]] = {}
 
 
@@ -255,8 +255,8 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
         hair = settings.hair
         taking.enabled = hair is not None and (has_cache(hair) or bool(hair.neuralocks_hair.replaced))
         taking.operator("neuralocks.detach", text="", icon="X")
-        if hair is not None and not hair.neuralocks_hair.live and stretched_since(hair, context.scene):
-            words(layout, f"{hair.name_full}: {STRETCHED}", "ERROR")
+        if hair is not None and not hair.neuralocks_hair.live and retimed_since(hair, context.scene):
+            words(layout, f"{hair.name_full}: {RETIMED}", "ERROR")
 
 
 def findings(armature) -> tuple[list[str], str]:

@@ -17,6 +17,8 @@ from .save_as import named_here
 
 REPLACED = "replaced"
 """The setting that stores which modifiers are off because the cache contains the surface's motion."""
+RATE = "neuralocks_rate"
+"""The property of a cache file that stores the frames per second of the scene that it was baked for."""
 
 
 def check_own(thing) -> None:
@@ -50,15 +52,18 @@ def has_cache(thing) -> bool:
     return shown or _original(thing, modifier) is None
 
 
-def stretched_since(thing, scene) -> bool:
-    """Whether this scene's time stretching has changed since the cache of an object was baked. The cache then stays in step with
-    the body, but plays the motion that it was baked for, and ends with its frames.
+def retimed_since(thing, scene) -> bool:
+    """Whether this scene's frame rate or time stretching has changed since the cache of an object was baked. The cache then stays in
+    step with the body, but plays the motion that it was baked for, and ends with its frames.
     """
     cache = thing.modifiers[MODIFIER].cache_file if has_cache(thing) else None
     if cache is None:
         return False
     drivers = cache.animation_data.drivers if cache.animation_data else ()
-    return "".join(curve.driver.expression for curve in drivers if curve.data_path == "frame") != _in_step(scene)
+    stretch = "".join(curve.driver.expression for curve in drivers if curve.data_path == "frame")
+    return stretch != _in_step(scene) or cache.get(RATE, _rate(scene)) != _rate(
+        scene
+    )  # older files do not tell the rate
 
 
 def players(path: str) -> list:
@@ -92,8 +97,11 @@ def renew(path: str, prims: dict[str, str], scene) -> None:
         if modifier.object_path != prim:
             modifier.object_path = prim
         blur.attach(hair)
-    if playing:
-        read_again({hair.modifiers[MODIFIER].cache_file for hair in playing})
+    caches = {hair.modifiers[MODIFIER].cache_file for hair in playing}
+    for cache in caches:
+        _follow_time(cache, scene)
+    if caches:
+        read_again(caches)
     for hair in other:
         if hair.name_full in prims:
             attach(hair, path, prims[hair.name_full], scene)
@@ -159,11 +167,16 @@ def _follow_time(cache, scene) -> None:
     """Play the baked frames even if time is stretched: everything animated, including caches, is then at another frame than the one
     shown.
     """
+    cache[RATE] = _rate(scene)
     cache.driver_remove("frame")
     expression = _in_step(scene)
     cache.override_frame = bool(expression)
     if expression:
         cache.driver_add("frame").driver.expression = expression
+
+
+def _rate(scene) -> float:
+    return round(scene.render.fps / scene.render.fps_base, 6)
 
 
 def _in_step(scene) -> str:

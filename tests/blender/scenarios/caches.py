@@ -158,8 +158,8 @@ def taken_off(folder: Path) -> None:
     assert operators.detach() == {"FINISHED"} and deform.show_viewport and deform.show_render
 
 
-def stretched_since(folder: Path) -> None:
-    """If time stretching changes after hair was attached, a note says so, with the remedy, which makes the hair equal to live hair.
+def retimed_since(folder: Path) -> None:
+    """If the frame rate or time stretching changes after hair was attached, a note says so, with the remedy, which makes the hair equal to live hair.
     Until then, the cache stays in step with the body, plays the old motion, and stands still where that ends.
     """
     needs_usd()
@@ -171,12 +171,13 @@ def stretched_since(folder: Path) -> None:
 
     def told() -> bool:
         said = " ".join(drawn())
-        assert ("Hair: Time Stretching was" in said) == ("press Bake and Attach again" in said), said
-        return "Time Stretching" in said
+        found = "Hair: the frame rate or Time Stretching was" in said
+        assert found == ("press Bake and Attach again" in said), said
+        return found
 
     attached_once = False
-    for old, new in ((100, 100), (100, 200), (100, 100)):
-        scene.render.frame_map_old, scene.render.frame_map_new = old, new
+    for rate, old, new in ((24, 100, 100), (24, 100, 200), (24, 100, 100), (60, 100, 100)):
+        scene.render.fps, scene.render.frame_map_old, scene.render.frame_map_new = rate, old, new
         assert told() == attached_once
         assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}
         attached_once = True
@@ -187,7 +188,18 @@ def stretched_since(folder: Path) -> None:
         strands.neuralocks_hair.live = False
         scene.render.frame_map_old, scene.render.frame_map_new = 2 * old, 2 * new
         assert not told(), "the same stretch in other numbers"
-    scene.render.frame_map_new = 50
+    for rate, base, changed in ((120, 2.0, False), (120, 1.0, True), (60, 1.0, False)):
+        scene.render.fps, scene.render.fps_base = rate, base
+        assert told() == changed, (rate, base)
+    scene.render.fps, scene.render.frame_map_new = 30, 50
+    assert told()
+    assert bpy.ops.neuralocks.bake(filepath=scene.neuralocks.output) == {"FINISHED"}
+    assert not told(), "what it plays was baked anew"
+    attached = points_at(strands, 20)
+    strands.neuralocks_hair.live = True
+    assert apart(points_at(strands, 20), attached) < SAME
+    scene.render.fps = 24
+    strands.neuralocks_hair.live = False
     assert told()
     assert bpy.ops.neuralocks.detach() == {"FINISHED"} and not told()
 
