@@ -17,19 +17,37 @@ FAR = 0.005
 """Smaller distances are not reported [m]."""
 REACH = 0.5
 """How far from the head's joint a distance matters [m]."""
+REFINING = {"SUBSURF", "MULTIRES"}
+"""Modifiers that put new vertices after a mesh's own."""
+MOVING = {
+    *(
+        "ARMATURE",
+        "CAST",
+        "CORRECTIVE_SMOOTH",
+        "CURVE",
+        "DISPLACE",
+        "HOOK",
+        "LAPLACIANDEFORM",
+        "LAPLACIANSMOOTH",
+        "LATTICE",
+    ),
+    *("MESH_DEFORM", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "SURFACE_DEFORM", "WARP", "WAVE"),
+}
+"""Modifiers that only move vertices."""
 
 
 def drawn(mesh_object, graph) -> np.ndarray | None:
-    """World points (V, 3) of a mesh as it is drawn, in Blender's space. None if they are not its own vertices, because a modifier
-    makes others, or if Blender does not evaluate it, or does so without its armature.
+    """World points (V, 3) of a mesh's own vertices as they are drawn, in Blender's space. None if they cannot be told from those that
+    a modifier makes, or if Blender does not evaluate it, or does so without its armature.
     """
     off = any(modifier.type == "ARMATURE" and not modifier.show_viewport for modifier in mesh_object.modifiers)
     if off or not evaluated_for_itself(mesh_object, graph):
         return None
     evaluated = mesh_object.evaluated_get(graph)
-    if len(evaluated.data.vertices) != len(mesh_object.data.vertices):
+    own, all_drawn = len(mesh_object.data.vertices), vertices(evaluated.data)
+    if len(all_drawn) != own and not (len(all_drawn) > own and _own_first(mesh_object)):
         return None
-    return transformed(vertices(evaluated.data), matrix(evaluated.matrix_world))
+    return transformed(all_drawn[:own], matrix(evaluated.matrix_world))
 
 
 def all_told(armature, bodies: list, seen: dict, character, clip, unit: float) -> tuple[str, ...]:
@@ -62,6 +80,11 @@ def _told(mesh_object, far: float) -> str:
     )
 
 
+def _own_first(mesh_object) -> bool:
+    """Whether all modifiers that the viewport shows leave a mesh's own vertices first."""
+    return all(m.type in REFINING | MOVING for m in mesh_object.modifiers if m.show_viewport)
+
+
 def _causes(mesh_object) -> list[str]:
     """What may move vertices besides weights and shape keys."""
     found = []
@@ -71,6 +94,16 @@ def _causes(mesh_object) -> list[str]:
         if modifier.type == "ARMATURE":
             settings = {"Preserve Volume": modifier.use_deform_preserve_volume, "Vertex Group": modifier.vertex_group}
             found += [f"{name} of '{modifier.name}'" for name, used in settings.items() if used]
+            found += _bendy(modifier.object, mesh_object.vertex_groups)
         elif modifier.show_viewport:
             found.append(f"modifier '{modifier.name}'")
     return found
+
+
+def _bendy(armature, groups) -> list[str]:
+    """What to say of the bones with segments that move these vertex groups: hair is kept out of a body that bends at joints alone."""
+    bones = [b.name for b in armature.data.bones if b.bbone_segments > 1 and b.name in groups] if armature else []
+    if not bones:
+        return []
+    more = f" and {len(bones) - 1} more" if bones[1:] else ""
+    return [f"Segments above 1 of the bendy bone '{bones[0]}'{more}"]

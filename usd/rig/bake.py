@@ -96,7 +96,7 @@ def bake_rig(
         loop: the clip repeats, and its last sample shows the pose of its first.
         strength: motion strength of a dynamic model, from 0 to 2; 1 is as trained.
         wind, gusts: as for `baking.bake.bake`; a dynamic model feels them.
-        cuts: time codes at which a character is suddenly elsewhere and its hair starts anew; detected if None.
+        cuts: time codes at which a character is suddenly elsewhere and its hair starts anew, [] for none; detected if None.
         joints: semantic joint -> joint (path, or its last part), if names are not enough.
         tell: called with the notes known before hair is turned, then with the others.
         progress: called with (done, total, message).
