@@ -61,9 +61,8 @@ def retimed_since(thing, scene) -> bool:
         return False
     drivers = cache.animation_data.drivers if cache.animation_data else ()
     stretch = "".join(curve.driver.expression for curve in drivers if curve.data_path == "frame")
-    return stretch != _in_step(scene) or cache.get(RATE, _rate(scene)) != _rate(
-        scene
-    )  # older files do not tell the rate
+    rate = cache.get(RATE, _rate(scene))  # older files do not tell it
+    return stretch != _in_step(scene) or rate != _rate(scene)
 
 
 def players(path: str) -> list:

@@ -19,20 +19,10 @@ REACH = 0.5
 """How far from the head's joint a distance matters [m]."""
 REFINING = {"SUBSURF", "MULTIRES"}
 """Modifiers that put new vertices after a mesh's own."""
-MOVING = {
-    *(
-        "ARMATURE",
-        "CAST",
-        "CORRECTIVE_SMOOTH",
-        "CURVE",
-        "DISPLACE",
-        "HOOK",
-        "LAPLACIANDEFORM",
-        "LAPLACIANSMOOTH",
-        "LATTICE",
-    ),
-    *("MESH_DEFORM", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "SURFACE_DEFORM", "WARP", "WAVE"),
-}
+MOVING = set(
+    "ARMATURE CAST CORRECTIVE_SMOOTH CURVE DISPLACE HOOK LAPLACIANDEFORM LAPLACIANSMOOTH LATTICE MESH_DEFORM SHRINKWRAP "
+    "SIMPLE_DEFORM SMOOTH SURFACE_DEFORM WARP WAVE".split()
+)
 """Modifiers that only move vertices."""
 
 
