@@ -10,6 +10,7 @@ import pytest
 
 from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.materials import RANGES
 from neuralocks_core.runtime import StrandModel
 
 
@@ -38,16 +39,21 @@ def test_other_errors_keep_their_traceback(monkeypatch, capsys):
     assert "ModuleNotFoundError: no numpy" in capsys.readouterr().err
 
 
-def test_a_livelier_model_feels_the_head_accelerate_by_so_many_times_and_holds_poses_as_before(monkeypatch, tmp_path):
+def test_a_livelier_model_takes_acceleration_and_damping_for_so_many_times_and_nothing_else(monkeypatch, tmp_path):
     pytest.importorskip("torch", reason="the extra 'train' is not installed")
     monkeypatch.syspath_prepend(Path(__file__).parents[1] / "benchmarks")
     shipped = model.shipped()
-    livelier = import_module("livelier").livelier(shipped, 1.5, tmp_path / "livelier.neuralocks")
+    livelier = import_module("livelier").livelier(shipped, 1.5, tmp_path / "livelier.neuralocks", damping=1.25)
     before, after = (StrandModel.load(path) for path in (shipped, livelier))
     spec = before.spec
     random = np.random.default_rng(0)
     vector = random.normal(0, 0.1, spec.size).astype(np.float32)
     vector[spec.slices["history"]] = 0
+    damping = spec.slices["material"].start + list(RANGES).index("damping")
+    vector[damping] = 0
+    damped, more = vector.copy(), vector.copy()
+    damped[damping], more[damping] = 0.4, 1.25 * 0.4
+    assert_close(after.frame(damped), before.frame(more))
     assert_close(after.frame(vector), before.frame(vector))
     pushed, spun = vector.copy(), vector.copy()
     history = random.normal(0, 0.1, (len(spec.bins), spec.per_bin)).astype(np.float32)
@@ -57,7 +63,9 @@ def test_a_livelier_model_feels_the_head_accelerate_by_so_many_times_and_holds_p
     more = pushed.copy()
     more[spec.slices["history"]] = np.where(np.arange(spec.per_bin) < 3, 1.5 * history, history).ravel()
     assert_close(after.frame(pushed), before.frame(more))
-    assert model.read(livelier).meta["training"]["livelier"] == "acceleration of the head, times 1.5"
+    assert (
+        model.read(livelier).meta["training"]["livelier"] == "acceleration of the head, times 1.5; damping, times 1.25"
+    )
 
 
 def assert_close(one: dict, other: dict) -> None:
