@@ -11,60 +11,58 @@ from tests.blender import scenes
 
 def drawn_elsewhere(_folder: Path) -> None:
     """A body moved by more than its weights and shape keys gets a note on how far and by what; a plain one does not."""
-    scene, rig = bpy.context.scene, scenes.armature()
-    scenes.dance(rig)
-    body, strands = scenes.body(rig), scenes.hair(rig, 4)
-    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
-
-    def said() -> str:
-        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-        return " ".join(session.rigs["Rig"].bodies_off)
-
+    _, body = _character()
     body.shape_key_add(name="Basis")
     wide = body.shape_key_add(name="Wide")
     for point in wide.data:
         point.co.x *= 1.5
     wide.value, body.location = 0.4, (0.1, 0, 0)
-    assert not said()
-    scene.unit_settings.scale_length = 0.01
-    assert not said()
-    scene.unit_settings.scale_length = 1.0
+    assert not _said()
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    assert not _said()
+    bpy.context.scene.unit_settings.scale_length = 1.0
     cast = body.modifiers.new("Rounder", "CAST")
     cast.factor = 0.2
-    assert "modifier 'Rounder'" in said() and " mm " in said() and "Body" in said()
+    assert "modifier 'Rounder'" in _said() and " mm " in _said() and "Body" in _said()
     cast.show_viewport = False
     body.active_shape_key_index, body.show_only_shape_key = 1, True
-    assert "pinned" in said()
+    assert "pinned" in _said()
     body.show_only_shape_key = False
-    assert not said()
+    assert not _said()
     some = body.vertex_groups.new(name="some")
     some.add([v.index for v in body.data.vertices], 0.3, "REPLACE")
     body.modifiers[0].vertex_group = "some"
-    assert f"Vertex Group of '{body.modifiers[0].name}'" in said()
+    assert f"Vertex Group of '{body.modifiers[0].name}'" in _said()
 
 
 def drawn_elsewhere_below_more(_folder: Path) -> None:
     """What moves a body is told below a subdivision, too, and for bones of several segments; not if other vertices are drawn."""
+    rig, body = _character()
+    subdivision = body.modifiers.new("Finer", "SUBSURF")
+    subdivision.subdivision_type, subdivision.levels = "SIMPLE", 1
+    assert not _said()
+    puff = body.modifiers.new("Puff", "DISPLACE")
+    puff.strength = 0.02
+    assert "modifier 'Puff'" in _said()
+    body.modifiers.new("Thick", "SOLIDIFY")
+    assert not _said()
+    body.modifiers.clear()
+    body.modifiers.new("Armature", "ARMATURE").object = rig
+    assert not _said()
+    rig.data.bones["head"].bbone_segments = 8
+    rig.pose.bones["head"].bbone_curveinx = 0.3
+    assert "Segments above 1 of the bendy bone 'head'" in _said()
+
+
+def _character():
+    """An armature that moves, with hair, and its body."""
     scene, rig = bpy.context.scene, scenes.armature()
     scenes.dance(rig)
     body, strands = scenes.body(rig), scenes.hair(rig, 4)
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    return rig, body
 
-    def said() -> str:
-        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-        return " ".join(session.rigs["Rig"].bodies_off)
 
-    subdivision = body.modifiers.new("Finer", "SUBSURF")
-    subdivision.subdivision_type, subdivision.levels = "SIMPLE", 1
-    assert not said()
-    puff = body.modifiers.new("Puff", "DISPLACE")
-    puff.strength = 0.02
-    assert "modifier 'Puff'" in said()
-    body.modifiers.new("Thick", "SOLIDIFY")
-    assert not said()
-    body.modifiers.clear()
-    body.modifiers.new("Armature", "ARMATURE").object = rig
-    assert not said()
-    rig.data.bones["head"].bbone_segments = 8
-    rig.pose.bones["head"].bbone_curveinx = 0.3
-    assert "Segments above 1 of the bendy bone 'head'" in said()
+def _said() -> str:
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    return " ".join(session.rigs["Rig"].bodies_off)
