@@ -45,9 +45,8 @@ def livelier(model: Path, times: float, out: Path, damping: float = 1.0) -> Path
     beginning.fill(net)
     history = spec.slices["history"]
     place = spec.slices["material"].start + list(RANGES).index("damping")
-    normal = float(
-        net.frame_mean[place] * net.frame_scale[place]
-    )  # what a layer takes off the default, a logarithm of 0
+    # A layer sees the default, a logarithm of 0, as so much below 0.
+    normal = float(net.frame_mean[place] * net.frame_scale[place])
     with torch.no_grad():
         for layer in (net.frame, *list(net.encoder or ())[:1]):
             layer.weight[:, history].unflatten(1, (-1, spec.per_bin))[..., :3] *= times

@@ -79,8 +79,8 @@ def training_scene(
         **settings: further fields of TrainingScene.
 
     Raises:
-        NeuralocksError: a file is missing or cannot be used, there is no hair, variations are asked for without the library, or too many, or an unknown
-            gesture.
+        NeuralocksError: a file is missing or cannot be used, there is no hair, variations are asked for without the library, or too
+            many, or an unknown gesture.
     """
     grooms, motion = ([words] if isinstance(words, str | Path) else words for words in (grooms, motion))
     if not 0 <= variations <= MOST_VARIATIONS:

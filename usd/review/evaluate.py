@@ -40,7 +40,8 @@ def evaluate(
         baked: path of the bake, or a `Baked` already read.
         reference: simulate the same strands and compare.
         grooms, skeleton, head, joints: as for `bake`.
-        model: only with `reference`: the model whose held-pose answer is shown next to it; if left out, the shipped one that suits each groom.
+        model: only with `reference`: the model whose held-pose answer is shown next to it; if left out, the shipped one that suits
+            each groom.
         material: what the hair is made of, for energies and reference: a Material, words NAME=VALUE or a dict of them, as for
             `bake`; if left out, what each groom's bake records.
         progress: called with (done, total, message).

@@ -17,7 +17,7 @@ from ..border.time_codes import time_codes
 from ..shot.character_notes import lies_down
 from ..shot.notes import not_animated, on_twos, without_turn
 from ..shot.stage import check_frames_named, frame_range
-from ..skel.old_copy import is_outdated, outdated_note
+from ..skel.old_copy import outdated_note
 from ..skel.rig_copy import outdated_of
 from .layer import kept_hair
 from .notes import mirrored_notes, rigged_notes
@@ -188,7 +188,7 @@ def _outdated(hair: RiggedHair) -> list[str]:
     """Joints of other hair that an earlier bake moves as the animation was then."""
     source = hair.source.source
     kept = kept_hair(source, hair.rig.chains.joints)
-    if kept and not is_outdated(source, hair.source.time_codes):
+    if kept and not hair.source.outdated:
         former = outdated_of(source.copied)
         return [name for name in kept if name in former]
     return list(kept)

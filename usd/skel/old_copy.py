@@ -13,20 +13,25 @@ COMPARED = 100
 """About this many poses of a rig bake are compared with those that it was made from."""
 
 
-def copy_notes(source: JointSource, time_codes: np.ndarray) -> list[str]:
-    """The notes on a rig bake whose body or hair is of an earlier state of the animation that it was made from."""
+def copy_notes(source: JointSource, outdated: bool) -> list[str]:
+    """The notes on a rig bake whose body, which is `outdated` then, or hair is of an earlier state of the animation that it was made
+    from.
+    """
     copy = source.copied or source.animation
     notes = []
-    if is_outdated(source, time_codes):
-        fact = f"{source.path}: its animation {copy.GetName()} is a rig bake of {source_of(copy).GetPath()}, which has changed since"
-        notes.append(f"{fact}; {'what that shows is read' if source.copied else 'bake the rig again'}")
+    if outdated:
+        fact = f"its animation {copy.GetName()} is a rig bake of {source_of(copy).GetPath()}, which has changed since"
+        remedy = "what that shows is read" if source.copied else "bake the rig again"
+        notes.append(f"{source.path}: {fact}; {remedy}")
     if source.copied is None and copy and (old := outdated_of(copy)):
         notes.append(outdated_note(source, old))
     return notes
 
 
 def is_outdated(source: JointSource, time_codes: np.ndarray) -> bool:
-    """Whether the body of a rig bake moves otherwise than the animation that it was made from, in some of the poses at time codes."""
+    """Whether the body of a rig bake moves otherwise than the animation that it was made from, in some of the poses at these time
+    codes.
+    """
     copy = source.copied or source.animation
     if not copy or not source_of(copy):
         return False
@@ -43,5 +48,8 @@ def is_outdated(source: JointSource, time_codes: np.ndarray) -> bool:
 def outdated_note(source: JointSource, joints) -> str:
     """The note on hair joints that a rig bake keeps from an earlier one, made from an animation that has changed since."""
     first, *others = map(leaf, joints)
-    more = f" and {len(others)} more hair joints keep" if others else " keeps"
-    return f"{source.path}: '{first}'{more} the motion of an earlier animation; bake from this file again with the model of that hair"
+    keeps = f"and {len(others)} more hair joints keep" if others else "keeps"
+    return (
+        f"{source.path}: '{first}' {keeps} the motion of an earlier animation; bake from this file again with the model of that "
+        "hair"
+    )

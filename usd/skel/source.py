@@ -20,7 +20,7 @@ from .blend_shapes import all_shares, knot_weights
 from .clip_codes import clip_codes
 from .cut_samples import cut_samples
 from .joints import JointSource
-from .old_copy import copy_notes
+from .old_copy import copy_notes, is_outdated
 from .stage_rig import StageRig, joint_trim
 from .surface import Skins, bound_meshes, find_skins, merged_body, moved_joints, not_posed, seen_in_turn
 
@@ -59,7 +59,8 @@ def read_rig(
     source = JointSource(prim, unbaked)
     notes = source.notes
     time_codes = clip_codes(source, border)
-    notes += copy_notes(source, time_codes)
+    outdated = is_outdated(source, time_codes)
+    notes += copy_notes(source, outdated)
     posed = source.posed(time_codes)
     meshes = bound_meshes(find_skins(stage) if skins is None else skins, source, notes)
     notes += not_posed(meshes, source) + seen_in_turn(meshes)
@@ -103,6 +104,7 @@ def read_rig(
         knots=knots,
         notes=notes,
         by_hand=by_hand,
+        outdated=outdated,
     )
 
 

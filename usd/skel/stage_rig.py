@@ -39,6 +39,7 @@ class StageRig:
         knots: blend shapes of the body, by name, with their `knot_weights`.
         notes: what a user should know about it.
         by_hand: semantic joint -> joint, as the user named them.
+        outdated: whether its animation, or the one in whose place another is read, is a rig bake of one that has changed since.
     """
 
     path: str
@@ -52,6 +53,7 @@ class StageRig:
     knots: dict[str, list[float]] = field(repr=False)
     notes: list[str] = field(repr=False)
     by_hand: dict[str, str] = field(default_factory=dict, repr=False)
+    outdated: bool = False
     _carrying: dict[tuple[int, float], np.ndarray] = field(default_factory=dict, repr=False, compare=False)
 
     def carrying_at(self, time_code: float) -> np.ndarray:
