@@ -15,6 +15,7 @@ from ..live import refresh
 from ..scene.lookup import in_scene
 from ..scene.paths import FILE, check_found
 from ..scene.sampling import in_slices
+from ..scene.up_to_date import known
 from ..services.panel_errors import for_the_panel
 from ..services.remaining import in_words
 from ..session import session
@@ -163,6 +164,12 @@ def sampling(context, armature, share: float = 1.0):
     for done, total in in_slices(context, armature, SAMPLED if _running else math.inf):
         yield share * done, total, f"Sampling the motion of {name}"
     return session.rigs[name]
+
+
+def sampled_once(context, armature):
+    """The same, but only if the motion is not sampled yet, or stale."""
+    found = known(armature, context.scene)
+    return found if found is not None else (yield from sampling(context, armature))
 
 
 def tell(operator, message: str, notes: list[str]) -> None:

@@ -18,7 +18,6 @@ from ..scene.attach import check_own
 from ..scene.export import write_shot
 from ..scene.lookup import named
 from ..scene.paths import absolute
-from ..scene.up_to_date import ensure
 from ..services.bones import LiveBones, chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.names import file_label
@@ -28,26 +27,27 @@ from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
 from .bake import frame_range, is_anothers, output_path, shot_beside
-from .base import FILE_ONCE, Hardened, Stepwise, sampling, shown_armature, tell
+from .base import FILE_ONCE, Hardened, Stepwise, sampled_once, sampling, shown_armature, tell
 
 
-class NEURALOCKS_OT_find_chains(Hardened, bpy.types.Operator):
+class NEURALOCKS_OT_find_chains(Stepwise, bpy.types.Operator):
     """Find the chains of hair bones below the head"""
 
     bl_idname = "neuralocks.find_chains"
     bl_label = "Find Hair Bones"
     bl_options = {"REGISTER"}
 
-    def work(self, context):
+    def steps(self, context):
         armature = shown_armature(context)
-        sampled = ensure(context, armature)
-        chains = chains_of(sampled.rig, sampled.character, armature.neuralocks_character.chains)
+        name, wanted = armature.name_full, armature.neuralocks_character.chains
+        sampled = yield from sampled_once(context, armature)
+        chains = chains_of(sampled.rig, sampled.character, wanted)
         lines = [
             f"{sampled.rig.said(chains.chain_name(i))}: {int((chains.chain == i).sum())} bones, {100 * chains.chain_length(i):.0f} cm"
             for i in range(len(chains.roots))
         ]
-        session.cards[armature.name_full] = lines
-        return f"{armature.name_full}: {len(chains)} hair bones in {len(lines)} chains"
+        session.cards[name] = lines
+        return f"{name}: {len(chains)} hair bones in {len(lines)} chains"
 
 
 class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
@@ -143,7 +143,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         tell(self, f"{name}: hair bones written to {out}", notes)
 
 
-class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
+class NEURALOCKS_OT_export_c(Stepwise, bpy.types.Operator):
     """Write the model of the hair bones as a C header for a game engine, with a worked example beside it, NAME_example.c"""
 
     bl_idname = "neuralocks.export_c"
@@ -156,7 +156,7 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
         **FILE_ONCE,
     )
 
-    def work(self, context):
+    def steps(self, context):
         from neuralocks_core.rig.export_c import example_beside, export_c, made_here
 
         armature = shown_armature(context)
@@ -164,10 +164,11 @@ class NEURALOCKS_OT_export_c(Hardened, bpy.types.Operator):
         out = Path(absolute(path))
         if out.is_dir():
             raise NeuralocksError(f"{path}: this is a folder; name a header file in it")
-        sampled, model = ensure(context, armature), RigModel.load(model_path(armature, "rig"))
+        model = RigModel.load(model_path(armature, "rig"))
+        check_ours([out, example_beside(out)], made_here)
+        sampled = yield from sampled_once(context, armature)
         # Reports if the model belongs to another rig, as the shipped one does.
         LiveBones.of(model, sampled.rig, sampled.character)
-        check_ours([out, example_beside(out)], made_here)
         export_c(model, out)
         return f"C header written to {out}"
 

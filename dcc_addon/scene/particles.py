@@ -8,7 +8,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
-from neuralocks_core.rotation import inverse, transformed
+from neuralocks_core.rotation import flat
 
 from ..services.widths import radii
 from . import curves
@@ -75,9 +75,8 @@ def convert(context, source, system, children: bool = True):
         evaluated = source.evaluated_get(context.evaluated_depsgraph_get())
         counts, points = _keys(evaluated, system.name)
         if children:
-            more = _children(evaluated, system.name)
-            counts = np.concatenate([counts, np.full(len(more), more.shape[1], int)])
-            points = np.concatenate([points, more.reshape(-1, 3)])
+            more, their_points = _children(context, source, evaluated, system)
+            counts, points = np.concatenate([counts, more]), np.concatenate([points, their_points])
     thick, material = _radii(settings, counts, points), _material(source, settings)
     data = curves.create(f"{system.name} Hair", counts, points, thick, material)
     hair = bpy.data.objects.new(data.name, data)
@@ -111,6 +110,7 @@ def _rendered(settings, children: bool) -> dict[str, int]:
     number = "child_percent" if hasattr(settings, "child_percent") else "child_nbr"
     return {
         number: settings.rendered_child_count,
+        "use_parent_particles": False,  # they are read key by key, and would be converted beside their children
         "display_percentage": 100,
         "display_step": max(settings.display_step, CHILD_STEPS),
     }
@@ -156,21 +156,22 @@ def _keys(evaluated, system: str) -> tuple[np.ndarray, np.ndarray]:
     return counts, points
 
 
-def _children(evaluated, system: str) -> np.ndarray:
-    """Points (C, N, 3) of the children in the object's space, without those that Blender leaves out."""
-    drawn = evaluated.particle_systems[system]
-    first, steps = len(drawn.particles), 2**drawn.settings.display_step + 1
-    points = [
-        drawn.co_hair(evaluated, particle_no=child, step=step)
-        for child in range(first, first + len(drawn.child_particles))
-        for step in range(steps)
-    ]
-    try:
-        to_own = inverse(matrix(evaluated.matrix_world))
-    except NeuralocksError:
+def _children(context, source, evaluated, system) -> tuple[np.ndarray, np.ndarray]:
+    """Points of each child (C,), and all of them (P, 3) in the object's space, by Blender's own conversion: its Python interface
+    gives a child's points one by one, and those beyond its end as zeros.
+    """
+    if flat(matrix(evaluated.matrix_world)[:3, :3]):
         raise NeuralocksError(
-            f"{evaluated.name}: has zero scale, so the children of '{system}' cannot be read; give it a scale above zero"
-        ) from None
-    own = transformed(np.array(points).reshape(-1, 3), to_own)
-    found = own.reshape(-1, steps, 3)
-    return found[np.ptp(found, axis=1).max(axis=1, initial=0.0) > 0]
+            f"{source.name}: has zero scale, so the children of '{system.name}' cannot be read; give it a scale above zero"
+        )
+    before, objects = set(bpy.data.hair_curves), context.view_layer.objects
+    active, selected = objects.active, list(objects.selected)
+    with context.temp_override(object=source, active_object=source, particle_system=system):
+        bpy.ops.curves.convert_from_particle_system()
+    (made,) = set(bpy.data.hair_curves) - before
+    groom = curves.counts(made), curves.shown(made)
+    bpy.data.hair_curves.remove(made)  # and its object, which was made active and selected
+    objects.active = active
+    for thing in selected:
+        thing.select_set(True)
+    return groom

@@ -14,14 +14,19 @@ def ensure(context, armature, looking: bool = False) -> SampledRig:
     """The sampled motion, sampled now if there is none or it is stale; with `looking`, also if some of its frames are not as they
     were.
     """
-    notice(armature, context.scene)
-    found = session.rigs.get(armature.name_full)
-    known = found is not None and not found.stale and found.key == key_of(armature, context.scene)
-    if not known or (looking and not _as_sampled(context, armature, found)):
+    found = known(armature, context.scene)
+    if found is None or (looking and not _as_sampled(context, armature, found)):
         for _ in in_slices(context, armature):
             pass
         found = session.rigs[armature.name_full]
     return found
+
+
+def known(armature, scene) -> SampledRig | None:
+    """The sampled motion if there is one that is not stale."""
+    notice(armature, scene)
+    found = session.rigs.get(armature.name_full)
+    return found if found is not None and not found.stale and found.key == key_of(armature, scene) else None
 
 
 def _as_sampled(context, armature, sampled: SampledRig) -> bool:

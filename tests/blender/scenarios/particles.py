@@ -84,6 +84,31 @@ def particle_systems(_folder: Path) -> None:
     assert convert(system="Fringe", children=False) == {"FINISHED"} and len(scene.neuralocks.hair.data.curves) == 10
 
 
+def cut_children(_folder: Path) -> None:
+    """Children of which a threshold cuts many short have their points on themselves, whether parents are drawn or not; nothing else
+    is left over, and what is selected stays so.
+    """
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0.3, 0, 1.6), rotation=(0.3, 0.2, 1.0))
+    ball, scene = bpy.context.active_object, bpy.context.scene
+    ball.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = ball.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 20, 0.2
+    settings.child_type, settings.rendered_child_count = "INTERPOLATED", 10
+    settings.child_length, settings.child_length_threshold = 0.5, 0.4
+    for drawn in (False, True):
+        settings.use_parent_particles = ball.modifiers[0].show_viewport = drawn
+        assert bpy.ops.neuralocks.from_particles(system=ball.particle_systems[0].name) == {"FINISHED"}
+        hair = scene.neuralocks.hair
+        assert len(hair.data.curves) == 20 + 20 * 10 and settings.use_parent_particles == drawn
+        assert len(bpy.data.hair_curves) == len([t for t in scene.objects if t.type == "CURVES"]) == 1 + drawn
+        counts = np.array([len(curve.points) for curve in hair.data.curves])[20:]
+        assert len(set(counts)) > 1
+        points = np.array([point.position for point in hair.data.points])
+        assert 0.099 < np.linalg.norm(points, axis=1).min() and np.linalg.norm(points, axis=1).max() < 0.35
+        objects = bpy.context.view_layer.objects  # Blender 3.4 forgets both when an object is added
+        assert bpy.app.version < (4, 0) or (objects.active == ball and list(objects.selected) == [ball])
+
+
 def simulated_particles(_folder: Path) -> None:
     """Particle hair that its own simulation has moved is converted as it was groomed."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))

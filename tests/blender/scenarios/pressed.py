@@ -28,7 +28,27 @@ def pressed(folder: Path) -> None:
     assert not messages(), messages()
 
 
-def _press(name: str, key: str = "TIMER") -> set:
+def pressed_for_bones(folder: Path) -> None:
+    """Hair bones are found, and their model exported, with progress while the motion is sampled, which is done once."""
+    from dcc_addon.session import session
+
+    rig, scene = scenes.armature(bones=scenes.BONES + scenes.TAIL), bpy.context.scene
+    scenes.body(rig)
+    scenes.dance(rig)
+    scene.neuralocks.armature = rig
+    assert _press("find_chains", "ESC") == {"CANCELLED"} and not session.rigs
+    assert _press("find_chains") == {"FINISHED"} and len(session.cards["Rig"]) == 1
+    known = session.rigs["Rig"]
+    assert _press("find_chains") == {"FINISHED"} and session.rigs["Rig"] is known
+    rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))
+    session.rigs.clear()
+    assert (
+        _press("export_c", "ESC", filepath=str(folder / "hair.h")) == {"CANCELLED"} and len(list(folder.iterdir())) == 1
+    )
+    assert _press("export_c", filepath=str(folder / "hair.h")) == {"FINISHED"} and (folder / "hair.h").exists()
+
+
+def _press(name: str, key: str = "TIMER", **settings) -> set:
     """Run an operator in a window, as Blender does where it has one; `key` is pressed after the first slice."""
     from dcc_addon.operators import base
 
@@ -36,10 +56,11 @@ def _press(name: str, key: str = "TIMER") -> set:
     with (
         patch.object(base, "bpy", SimpleNamespace(**window)),
         patch.object(base, "SLICE", 0.0),
+        patch.object(base, "SAMPLED", 0.0),
         patch.object(base.Hardened, "execute", lambda self, context: self.invoke(context, None)),
         bpy.context.temp_override(window=bpy.context.window_manager.windows[0]),
     ):
-        assert getattr(bpy.ops.neuralocks, name)() == {"RUNNING_MODAL"}
+        assert getattr(bpy.ops.neuralocks, name)(**settings) == {"RUNNING_MODAL"}
         (work,) = base._running
         assert work.modal(bpy.context, SimpleNamespace(type="MOUSEMOVE")) == {"PASS_THROUGH"}
         result = work.modal(bpy.context, SimpleNamespace(type="TIMER"))
