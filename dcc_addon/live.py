@@ -11,7 +11,7 @@ from .scene.layers import elsewhere, graph_of, layer_of
 from .scene.lively import lively
 from .scene.locked import lock
 from .scene.lookup import find, in_scene
-from .scene.sampling import key_of
+from .scene.sampled_from import key_of
 from .session import session
 
 

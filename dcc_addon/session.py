@@ -41,7 +41,7 @@ class SampledRig:
     trim: np.ndarray
     """See `services.motion.trim_of`."""
     key: tuple
-    """What the sampling depended on besides the animation; see `scene.sampling.key_of`."""
+    """What the sampling depended on besides the animation; see `scene.sampled_from.key_of`."""
     bind_places: dict[str, np.ndarray]
     """World transforms (4, 4) of hair and bodies in the bind pose, by name."""
     stale: bool = False
@@ -54,11 +54,11 @@ class SampledRig:
     own: np.ndarray = None
     """Rotation and scale from the bones' own channels, without constraints, (T, J, 3, 3) float32."""
     rigging: int = 0
-    """The setup that moves the rig; see `scene.sampling.rigging_of`."""
+    """The setup that moves the rig; see `scene.sampled_from.rigging_of`."""
     posture: int = 0
-    """The unkeyed pose; see `scene.sampling.posture_of`."""
+    """The unkeyed pose; see `scene.sampled_from.posture_of`."""
     moved_by: frozenset[str] = frozenset()
-    """Names of the objects that moved it; see `scene.sampling.moved_by`."""
+    """Names of the objects that moved it; see `scene.sampled_from.moved_by`."""
 
     carriers: dict[str, int] = field(default_factory=dict)
     """Joints below the head that carry hair objects, by name: the jaw of a beard. All others ride on the head."""
@@ -67,7 +67,7 @@ class SampledRig:
     body_arrays: tuple[BodyArrays, ...] = ()
     """The body meshes as they were read then: a mirror object may stand elsewhere beside the body in another frame."""
     bodies_off: tuple[str, ...] = ()
-    """Notes on bodies that are drawn elsewhere than where hair is kept out of them; see `scene.body_drawn`."""
+    """Notes on what hair is kept out of elsewhere than where it is drawn, or not at all; see `scene.body_drawn`, `scene.rigid_parts`."""
     leaps: tuple[str, ...] = ()
     """Notes on frames at which the character jumps; see `services.leaps`."""
     hairs_off: dict[str, str] = field(default_factory=dict)

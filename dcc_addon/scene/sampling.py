@@ -6,7 +6,6 @@ import time
 from collections.abc import Generator, Iterator
 from dataclasses import replace
 
-import bpy
 import numpy as np
 
 from neuralocks_core.animation.cuts import find_cuts
@@ -21,14 +20,14 @@ from ..services.motion import Motion, frame_numbers, trim_of
 from ..session import SampledRig, session
 from . import armature as armature_reader
 from . import body as body_reader
-from . import body_drawn, riding
+from . import body_drawn, riding, rigid_parts
 from .binding import bind_places, hidden
 from .carried import bodies_of, hairs_of
 from .layers import graph_of, layer_of, working_in
 from .lookup import find, named
 from .placing import world
 from .relations import found_anew
-from .rigging import posture, reached, rigging
+from .sampled_from import frames_of, key_of, moved_by, posture_of, rigging_of, shown_frame
 from .stepping import step, stepping
 from .watched import watched
 
@@ -36,70 +35,6 @@ BLOCK, MANY = 256, 6000
 """Most frames whose poses are converted to channels together, and most joints in all of them: on so few numbers, one frame costs as
 much as a block, and a block takes about a slice of work.
 """
-
-
-def shown_frame(scene) -> float:
-    """The frame that is shown, with its fraction, as the timeline counts; Blender's `frame_current_final` counts
-    stretched time.
-    """
-    return scene.frame_current + scene.frame_subframe
-
-
-def frames_of(scene) -> tuple[int, int]:
-    """First and last frame to sample: those of the scene, and those that the panel names for the bake, so that view and bake
-    remember the same past. Without a window, also those that the file had when it was opened: a render farm gives each machine a
-    part of them (-s 100 -e 120), and all parts must remember what the whole would.
-    """
-    settings, ranges = scene.neuralocks, [(scene.frame_start, scene.frame_end)]
-    if not settings.use_scene_range:
-        ranges.append((settings.frame_start, settings.frame_end))
-    if bpy.app.background and scene.name_full in session.opened:
-        ranges.append(session.opened[scene.name_full])
-    return min(first for first, _ in ranges), max(last for _, last in ranges)
-
-
-def timing_of(scene) -> tuple:
-    """What a sampling depends on in the scene: frames, sub-frames, rate, unit."""
-    return (
-        *frames_of(scene),
-        scene.neuralocks.subframes,
-        round(scene.render.fps / scene.render.fps_base, 6),
-        round(scene.unit_settings.scale_length, 9),
-    )
-
-
-def key_of(armature, scene) -> tuple:
-    """What a sampling of this armature depends on besides its animation; begins with `timing_of`."""
-    settings, bodies = armature.neuralocks_character, bodies_of(armature, scene)
-    return (
-        timing_of(scene),
-        tuple(body.name_full for body in bodies),
-        settings.head_bone,
-        tuple(armature.data.bones.keys()),
-        tuple(sorted(o.name_full for o in hairs_of(armature, scene))),
-    )
-
-
-def rigging_of(armature, scene) -> int:
-    """A number that changes when the setup that moves this armature, its hair or its bodies changes."""
-    return rigging(_moved_together(armature, scene))
-
-
-def posture_of(armature, scene) -> int:
-    """A number that changes when unkeyed values pose this armature, or what it depends on, differently; hair bones count as they
-    are without the hair's motion.
-    """
-    return posture(_moved_together(armature, scene))
-
-
-def moved_by(armature, scene) -> frozenset[str]:
-    """Names of the objects that move this armature, its hair or its bodies, with itself and the bodies."""
-    found = reached(_moved_together(armature, scene))
-    return frozenset(thing.name_full for thing in found if thing.type != "CURVES")
-
-
-def _moved_together(armature, scene) -> list:
-    return [armature, *hairs_of(armature, scene), *bodies_of(armature, scene)]
 
 
 def in_slices(context, armature, seconds: float = math.inf) -> Iterator[tuple[int, int]]:
@@ -148,6 +83,7 @@ class _Recording:
             if joint in self._needed:
                 self._needed.add(self._rig.parents[joint])
         self._bodies = [body.name_full for body in bodies_of(armature, self._scene)]
+        self._rigid = [o.name_full for o in rigid_parts.find(armature, bodies_of(armature, self._scene), self._scene)]
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
         self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
         self._posture, self._moved_by = posture_of(armature, self._scene), moved_by(armature, self._scene)
@@ -205,7 +141,8 @@ class _Recording:
             self._place = rig_service.stood_up(self._rig, here)
             self._bind = self._place @ self._rig.rest
             self._trim = trim_of(self._bind, self.name)
-            binds = bind_places(self._context, armature, self._tracked, self.reader, self._rig.rest)
+            placed = [*self._tracked, *self._rigid]
+            binds = bind_places(self._context, armature, placed, self.reader, self._rig.rest)
             # Not even rounding may move what already stands upright: hair pushed out of a body would jump.
             up = np.eye(4) if np.array_equal(self._place, here) else self._place @ np.linalg.inv(here)
             self._binds = {name: up @ bind for name, bind in binds.items()}
@@ -303,8 +240,16 @@ class _Recording:
             carriers=carriers,
             carried=carried,
             body_arrays=tuple(body for body, _ in arrays),
-            bodies_off=body_drawn.all_told(
-                armature, [body for body, _ in arrays], self._bodies_at, character, clip, self._unit
+            bodies_off=(
+                *body_drawn.all_told(
+                    armature, [body for body, _ in arrays], self._bodies_at, character, clip, self._unit
+                ),
+                *rigid_parts.told(
+                    armature,
+                    [part for name in self._rigid if (part := find(name)) is not None],
+                    [hair for name in hairs if (hair := find(name)) is not None],
+                    binds,
+                ),
             ),
             leaps=leaps_told(clip, character.head, motion.frames),
         )

@@ -6,7 +6,8 @@ from ..session import SampledRig, session
 from .carried import hairs_of
 from .layers import layer_of, working_in
 from .lookup import named
-from .sampling import in_slices, key_of, posture_of, rigging_of
+from .sampled_from import key_of, posture_of, rigging_of
+from .sampling import in_slices
 from .stepping import step, stepping
 
 

@@ -54,6 +54,32 @@ def drawn_elsewhere_below_more(_folder: Path) -> None:
     assert "Segments above 1 of the bendy bone 'head'" in _said()
 
 
+def head_of_its_own(_folder: Path) -> None:
+    """A head that rides on its bone as a whole is named, since it is not part of the body, until it is; glasses, and what renders do not
+    draw, are not.
+    """
+    rig, body = _character()
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.09, location=(0, 0, 1.66))
+    head = bpy.context.active_object
+    bpy.ops.mesh.primitive_cube_add(size=0.1, location=(0, -0.1, 1.62))
+    tail = scenes.translation((0, rig.data.bones["head"].length, 0))
+    for part, name in ((head, "Skull"), (bpy.context.active_object, "Glasses")):
+        part.name, part.parent, part.parent_type, part.parent_bone = name, rig, "BONE", "head"
+        part.matrix_parent_inverse = (rig.data.bones["head"].matrix_local @ tail).inverted()
+    assert "Skull: it rides on the bone 'head'" in _said() and "Glasses" not in _said()
+    head.hide_render = True
+    assert not _said()
+    head.hide_render = False
+    rig.neuralocks_character.body = head
+    assert "Skull" not in _said()
+    rig.neuralocks_character.body = None
+    head.vertex_groups.new(name="head").add(range(len(head.data.vertices)), 1.0, "REPLACE")
+    head.parent_type = "OBJECT"
+    head.matrix_parent_inverse.identity()
+    head.modifiers.new("Armature", "ARMATURE").object = rig
+    assert not _said()
+
+
 def _character():
     """An armature that moves, with hair, and its body."""
     scene, rig = bpy.context.scene, scenes.armature()

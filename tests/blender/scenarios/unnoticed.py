@@ -121,7 +121,7 @@ def many_drivers(_folder: Path) -> None:
     look at the unkeyed values would otherwise block Blender for seconds.
     """
     from dcc_addon.scene.animated import animated
-    from dcc_addon.scene.sampling import posture_of
+    from dcc_addon.scene.sampled_from import posture_of
 
     rig, scene = scenes.armature(), bpy.context.scene
     rig["switch"] = 0.5

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes under the hair that ride on a bone as a whole, such as a head that is a separate object: only what an armature deforms is
+its body.
+"""
+
+import numpy as np
+
+from neuralocks_core.rotation import flat, transformed
+
+from . import curves
+from .binding import carrying_bone
+from .body import vertices
+from .shown import in_renders
+
+MARGIN = 0.05
+"""How far roots may lie outside of a mesh's box, in sizes of the box."""
+UNDER = 0.5
+"""Share of the roots that lie in the box of a mesh that hair grows on."""
+
+
+def find(armature, bodies: list, scene) -> list:
+    """Rendered meshes with faces that ride on a bone of an armature as a whole, and are not among its `bodies`."""
+    meshes = (o for o in scene.objects if o.type == "MESH" and len(o.data.polygons) and o not in bodies)
+    return [o for o in meshes if carrying_bone(o, armature) and in_renders(o, scene)]
+
+
+def told(armature, parts: list, hairs: list, places: dict) -> tuple[str, ...]:
+    """Notes on `parts` that hair of an armature grows on; `places` has the world transforms (4, 4) of all in the rest pose."""
+    roots = np.concatenate([np.zeros((0, 3)), *(_roots(hair.data, places[hair.name_full]) for hair in hairs)])
+    found = sorted((o for o in parts if _under(o.data, places[o.name_full], roots)), key=lambda o: o.name_full)
+    return tuple(
+        f"{o.name_full}: it rides on the bone '{carrying_bone(o, armature)}' as a whole, so it is not part of the body, and hair is "
+        "not kept out of it; if it should be, give it an Armature modifier and a vertex group of that bone's name with all its "
+        "vertices, or choose it as Body"
+        for o in found
+    )
+
+
+def _roots(data, place: np.ndarray) -> np.ndarray:
+    """World positions (S, 3) of the roots."""
+    counts = curves.counts(data)
+    return transformed(curves.points(data)[np.cumsum(counts) - counts], place)
+
+
+def _under(mesh, place: np.ndarray, roots: np.ndarray) -> bool:
+    """Whether most roots lie in the box of a mesh."""
+    if flat(place[:3, :3]) or not len(roots):
+        return False
+    points, own = vertices(mesh), transformed(roots, np.linalg.inv(place))
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = MARGIN * np.linalg.norm(high - low)
+    return ((own >= low - margin) & (own <= high + margin)).all(axis=1).mean() >= UNDER

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a sampling of a rig's motion depends on, so that one that is out of date is noticed."""
+
+import bpy
+
+from ..session import session
+from .carried import bodies_of, hairs_of
+from .rigging import posture, reached, rigging
+
+
+def shown_frame(scene) -> float:
+    """The frame that is shown, with its fraction, as the timeline counts; Blender's `frame_current_final` counts
+    stretched time.
+    """
+    return scene.frame_current + scene.frame_subframe
+
+
+def frames_of(scene) -> tuple[int, int]:
+    """First and last frame to sample: those of the scene, and those that the panel names for the bake, so that view and bake
+    remember the same past. Without a window, also those that the file had when it was opened: a render farm gives each machine a
+    part of them (-s 100 -e 120), and all parts must remember what the whole would.
+    """
+    settings, ranges = scene.neuralocks, [(scene.frame_start, scene.frame_end)]
+    if not settings.use_scene_range:
+        ranges.append((settings.frame_start, settings.frame_end))
+    if bpy.app.background and scene.name_full in session.opened:
+        ranges.append(session.opened[scene.name_full])
+    return min(first for first, _ in ranges), max(last for _, last in ranges)
+
+
+def timing_of(scene) -> tuple:
+    """What a sampling depends on in the scene: frames, sub-frames, rate, unit."""
+    return (
+        *frames_of(scene),
+        scene.neuralocks.subframes,
+        round(scene.render.fps / scene.render.fps_base, 6),
+        round(scene.unit_settings.scale_length, 9),
+    )
+
+
+def key_of(armature, scene) -> tuple:
+    """What a sampling of this armature depends on besides its animation; begins with `timing_of`."""
+    settings, bodies = armature.neuralocks_character, bodies_of(armature, scene)
+    return (
+        timing_of(scene),
+        tuple(body.name_full for body in bodies),
+        settings.head_bone,
+        tuple(armature.data.bones.keys()),
+        tuple(sorted(o.name_full for o in hairs_of(armature, scene))),
+    )
+
+
+def rigging_of(armature, scene) -> int:
+    """A number that changes when the setup that moves this armature, its hair or its bodies changes."""
+    return rigging(_moved_together(armature, scene))
+
+
+def posture_of(armature, scene) -> int:
+    """A number that changes when unkeyed values pose this armature, or what it depends on, differently; hair bones count as they
+    are without the hair's motion.
+    """
+    return posture(_moved_together(armature, scene))
+
+
+def moved_by(armature, scene) -> frozenset[str]:
+    """Names of the objects that move this armature, its hair or its bodies, with itself and the bodies."""
+    found = reached(_moved_together(armature, scene))
+    return frozenset(thing.name_full for thing in found if thing.type != "CURVES")
+
+
+def _moved_together(armature, scene) -> list:
+    return [armature, *hairs_of(armature, scene), *bodies_of(armature, scene)]
