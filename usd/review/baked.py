@@ -12,6 +12,7 @@ from neuralocks_core.preview.film import Scene
 from neuralocks_core.rotation import transformed
 
 from ..border.values import as_numbers
+from ..shot.gaps import gaps
 from ..shot.made_from import baked_from_others
 from ..shot.recorded import recorded_cuts, recorded_joint, retimed
 from ..shot.stage import Shot, StageGroom, read_shot
@@ -136,8 +137,18 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
     left = [f"{path}: its points do not move; left out" for path, codes in sampled.items() if len(codes) < least]
     old = [note for item in items for note in baked_from_others(item.prim, item.attachment, item.groom)]
     old += [note for item in items for note in retimed(item.prim)]
+    broken = [note for item in items for note in _broken(item.path, list(sampled[item.path]), shot)]
     codes = sorted({code for item in items for code in sampled[item.path]})
-    return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left, *old)), np.array(codes))
+    return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left, *old, *broken)), np.array(codes))
+
+
+def _broken(path: str, codes: list[float], shot: Shot) -> list[str]:
+    """The note on frames that a groom lacks between others; a bake of a part of the shot is whole."""
+    found = [where for where in gaps(codes, shot.border.frame, shot.stage) if where.startswith("between")]
+    if not found:
+        return []
+    where = f"{', '.join(found[:4])}{', ...' if found[4:] else ''}"
+    return [f"{path}: has no samples {where}, where hair moves along straight lines; bake these frames, too"]
 
 
 def _named_head(shot: Shot) -> str | None:

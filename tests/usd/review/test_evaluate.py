@@ -182,6 +182,20 @@ def test_only_what_was_baked_is_measured(tmp_path, model):
     assert any("/Hero/Beard" in note for note in card.notes)
 
 
+def test_frames_that_a_bake_lacks_are_named(tmp_path, still_model):
+    """Between others; a bake of every fourth frame, or of the shot's middle, lacks none."""
+    bake(shipped_shot(), tmp_path / "part.usdc", still_model, frames="20:48:4", velocities=False, resolve=False)
+    assert not any("no samples" in note for note in evaluate(tmp_path / "part.usdc").notes)
+    stage = Usd.Stage.Open(str(tmp_path / "part.usdc"))
+    (groom,) = (path for path in evaluate(tmp_path / "part.usdc").grooms)
+    for code in (32, 36):
+        UsdGeom.BasisCurves(stage.GetPrimAtPath(groom)).GetPointsAttr().ClearAtTime(code)
+    stage.Save()
+    assert [note for note in evaluate(tmp_path / "part.usdc").notes if "no samples" in note] == [
+        f"{groom}: has no samples between 28 and 40, where hair moves along straight lines; bake these frames, too"
+    ]
+
+
 def test_each_groom_is_measured_at_its_own_samples(tmp_path, model):
     """Between its samples a groom is drawn along chords, and after them it stands still on a character that moves on."""
     stage = Usd.Stage.Open(str(write_shot(tmp_path)))
