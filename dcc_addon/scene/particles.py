@@ -14,7 +14,9 @@ from ..services.widths import radii
 from . import curves
 from .animated import moved
 from .armature import matrix
+from .attach import check_own
 from .binding import at_rest
+from .shown import home_of
 
 CHILD_STEPS = 4
 """A child gets at least two to this power segments."""
@@ -57,8 +59,9 @@ def convert(context, source, system, children: bool = True):
     Blender's own conversion gives the points that are drawn (9 by default), not the keys that were groomed.
 
     Raises:
-        NeuralocksError: the system has no hair.
+        NeuralocksError: the system has no hair, or its object belongs to another file.
     """
+    check_own(source)
     settings, render = system.settings, context.scene.render
     if settings.type != "HAIR":
         raise NeuralocksError(f"{source.name}: '{system.name}' emits particles; choose a system of type Hair")
@@ -70,7 +73,7 @@ def convert(context, source, system, children: bool = True):
         _changed(shown, show_viewport=True),
         _changed(system, use_hair_dynamics=False),  # a simulated shape is not a groom
         _changed(settings, **_rendered(settings, children)),
-        _changed(render, simplify_child_particles=render.simplify_child_particles_render),
+        _mesh_as_rendered(source, shown, render),
     ):
         evaluated = source.evaluated_get(context.evaluated_depsgraph_get())
         counts, points = _keys(evaluated, system.name)
@@ -80,7 +83,7 @@ def convert(context, source, system, children: bool = True):
     thick, material = _radii(settings, counts, points), _material(source, settings)
     data = curves.create(f"{system.name} Hair", counts, points, thick, material)
     hair = bpy.data.objects.new(data.name, data)
-    (source.users_collection[0] if source.users_collection else context.scene.collection).objects.link(hair)
+    home_of(source, context).objects.link(hair)
     hair.parent = source
     if hasattr(data, "surface") and source.type == "MESH":
         data.surface = source
@@ -127,6 +130,18 @@ def _changed(thing, **values):
     finally:
         for name, value in kept.items():
             setattr(thing, name, value)
+
+
+@contextmanager
+def _mesh_as_rendered(source, system_modifier, render):
+    """In this block, the viewport has what hair grows on, and as much hair on it, as renders have."""
+    simple = {name: getattr(render, f"{name}_render") for name in ("simplify_subdivision", "simplify_child_particles")}
+    with ExitStack() as changes:
+        changes.enter_context(_changed(render, **simple))
+        for modifier in list(source.modifiers)[: list(source.modifiers).index(system_modifier)]:
+            finer = {"levels": modifier.render_levels} if modifier.type in ("SUBSURF", "MULTIRES") else {}
+            changes.enter_context(_changed(modifier, show_viewport=modifier.show_render, **finer))
+        yield
 
 
 @contextmanager

@@ -30,8 +30,8 @@ def told(armature, parts: list, hairs: list, places: dict) -> tuple[str, ...]:
     found = sorted((o for o in parts if _under(o.data, places[o.name_full], roots)), key=lambda o: o.name_full)
     return tuple(
         f"{o.name_full}: it rides on the bone '{carrying_bone(o, armature)}' as a whole, so it is not part of the body, and hair is "
-        "not kept out of it; if it should be, give it an Armature modifier and a vertex group of that bone's name with all its "
-        "vertices, or choose it as Body"
+        f"not kept out of it; if it should be, choose it as Body, or take it off the bone with the rig at rest, parent it to "
+        f"{armature.name_full} with Armature Deform, and give that bone's vertex group all its vertices"
         for o in found
     )
 

@@ -25,6 +25,15 @@ def in_renders(thing, scene) -> bool:
     return drawn and _linked(thing, layers, "hide_render")
 
 
+def home_of(thing, context):
+    """The collection in which a new object appears wherever a thing does in this view layer: one of the thing's own; the scene's, if
+    none of them is shown, or all belong to other files.
+    """
+    shown = list(_included(context.view_layer.layer_collection, "hide_viewport"))
+    own = (each for each in thing.users_collection if each in shown and not (each.library or each.override_library))
+    return next(own, context.scene.collection)
+
+
 def _linked(thing, layers, off: str) -> bool:
     held = set(thing.users_collection)
     return any(each in held for layer in layers for each in _included(layer.layer_collection, off))

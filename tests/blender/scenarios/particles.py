@@ -109,6 +109,76 @@ def cut_children(_folder: Path) -> None:
         assert bpy.app.version < (4, 0) or (objects.active == ball and list(objects.selected) == [ball])
 
 
+def particles_where_they_show(folder: Path) -> None:
+    """Hair converted from particles is in a collection that shows it, whatever other collections its head is in; also on a head that is
+    overridden, while a linked one is refused and keeps its particles.
+    """
+    scene = bpy.context.scene
+    kept, own = bpy.data.collections.new("A"), bpy.data.collections.new("B")
+    for each in (kept, own):
+        scene.collection.children.link(each)
+        each.objects.link(_ball())
+    ball = own.objects[0]
+    kept.objects.link(ball)
+    bpy.context.view_layer.layer_collection.children["A"].exclude = True
+    bpy.context.view_layer.objects.active = ball
+    assert bpy.ops.neuralocks.from_particles() == {"FINISHED"}
+    assert [each.name for each in scene.neuralocks.hair.users_collection] == ["B"]
+
+    ball.modifiers[0].show_viewport = ball.modifiers[0].show_render = True
+    bpy.data.objects.remove(scene.neuralocks.hair)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "head.blend"))
+    for overridden in (False, True):
+        scenes.empty()
+        scene, layer = bpy.context.scene, bpy.context.view_layer
+        with bpy.data.libraries.load(str(folder / "head.blend"), link=True) as (_, wanted):
+            wanted.collections = ["B"]
+        (linked,) = wanted.collections
+        scene.collection.children.link(linked)
+        if overridden:
+            linked.override_hierarchy_create(scene, layer)
+            scene.collection.children.unlink(linked)
+        layer.update()
+        (ball,) = (thing for thing in scene.objects if thing.type == "MESH" and thing.visible_get())
+        if overridden:
+            assert bpy.ops.neuralocks.from_particles() == {"FINISHED"}
+            assert scene.neuralocks.hair.name in layer.objects and len(scene.neuralocks.hair.data.curves) == 40
+        else:
+            refused(bpy.ops.neuralocks.from_particles, ball.name, "linked from head.blend")
+            assert not bpy.data.hair_curves
+        assert ball.modifiers[0].show_render != overridden
+
+
+def particles_on_what_is_rendered(_folder: Path) -> None:
+    """Particle hair grows on the surface that renders show, however coarse it is in the viewport."""
+    ball = _ball("SUBSURF", "DISPLACE")
+    bpy.context.scene.collection.objects.link(ball)
+    bpy.context.view_layer.objects.active = ball
+    subdivision, puff = ball.modifiers[:2]
+    puff.strength = 0.01
+    found = []
+    for levels, drawn in ((0, False), (2, True)):
+        subdivision.levels, subdivision.render_levels, puff.show_viewport = levels, 2, drawn
+        assert bpy.ops.neuralocks.from_particles(system=ball.particle_systems[0].name) == {"FINISHED"}
+        assert (subdivision.levels, puff.show_viewport) == (levels, drawn)
+        found.append(np.array([p.position for p in bpy.context.scene.neuralocks.hair.data.points]))
+    assert apart(*found) < SAME
+
+
+def _ball(*modifiers: str):
+    """A small head with forty hairs on what these modifiers make of it, in no collection."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8, radius=0.1)
+    ball = bpy.context.active_object
+    for each in ball.users_collection:
+        each.objects.unlink(ball)
+    for kind in modifiers:
+        ball.modifiers.new(kind, kind)
+    ball.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = ball.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 40, 0.2
+    return ball
+
+
 def simulated_particles(_folder: Path) -> None:
     """Particle hair that its own simulation has moved is converted as it was groomed."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0, 0, 1.6))
