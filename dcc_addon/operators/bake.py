@@ -17,9 +17,9 @@ from ..looks import grouped
 from ..scene import attach, imported
 from ..scene.carried import hairs_of
 from ..scene.export import write_shot
-from ..scene.lookup import named
+from ..scene.lookup import find, named
 from ..scene.muting import on_top
-from ..scene.paths import absolute
+from ..scene.paths import absolute, beside
 from ..scene.riding import on_hair_bone
 from ..scene.shown import in_renders
 from ..services.names import file_label
@@ -63,16 +63,22 @@ def shot_beside(out: Path) -> Path:
     return out.with_name(f"{out.stem}_shot.usdc")
 
 
-def is_anothers(out: Path, character: str) -> bool:
-    """Whether an existing bake `out` belongs to another character than the one of this full name, or it or its shot to what was
-    imported from it.
+def owner_of(out: Path, character: str) -> str:
+    """Whom an existing bake `out`, or its shot, belongs to, if not to the character of this full name in this Blender file: what was
+    imported from it, another character, or another Blender file that plays it. Otherwise empty.
     """
-    from usd.assets.own_layers import character_of
+    from usd.assets.own_layers import character_of, player_of
 
     shot = shot_beside(out)
     if any(attach.is_imported(str(path)) for path in (out, shot)):
-        return True
-    return shot.is_file() and character_of(shot) not in ("", character)
+        return "what was imported from it"
+    if not shot.is_file():
+        return ""
+    other, player = character_of(shot), player_of(shot)
+    if player and player != beside(shot) and (shot.parent / player).is_file():
+        return f"{player}, which plays it"
+    own = any(thing.neuralocks_hair.armature == find(character) for thing in attach.players(str(out)))  # renamed since
+    return "" if own or other in ("", character) else f"another character, {other}"
 
 
 def frame_range(scene) -> tuple[int, int]:
@@ -126,10 +132,10 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
     from usd.assets.own_layers import is_own
     from usd.baking.bake import bake
 
-    free = untaken(Path(full), label, lambda path: any(is_anothers(out, character) for out in _outs(path, len(looks))))
+    free = untaken(Path(full), label, lambda path: any(owner_of(out, character) for out in _outs(path, len(looks))))
     if free != Path(full):
-        owner = "another character, or to what was imported from it,"
-        notes.append(f"{full}: it belongs to {owner} and is kept; this bake is written to {free.name}")
+        owner = next(filter(None, (owner_of(out, character) for out in _outs(Path(full), len(looks)))))
+        notes.append(f"{full}: it belongs to {owner}, and is kept; this bake is written to {free.name}")
     outs = _outs(free, len(looks))
     groups = [(out, *group) for out, group in zip(outs, looks)]
     for out, _, names in groups:
@@ -137,7 +143,8 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
             raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
     check_ours([*outs, *map(shot_beside, outs)], is_own)
     # If hair has velocities, Cycles blurs it along straight lines, and leaves the samples between the frames unread.
-    velocities = subframes == 1 or not (attached or any(attach.players(str(out)) for out in outs))
+    played = attached or any(attach.players(str(out)) for out in outs)
+    velocities = subframes == 1 or not played
     sampled = yield from sampling(context, named(character), share=0.5)
     notes += [text for name, text in sampled.hairs_off.items() if any(name in names for _, _, names in groups)]
     baked: dict[str, tuple[str, str]] = {}
@@ -147,7 +154,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
             shot = shot_beside(out)
             begin, end = (0.5 + 0.5 * (number + done) / len(looks) for done in (0, 1))
             own = [named(name) for name in names]
-            prims = yield from write_shot(shot, named(character), sampled, own, undrawn, begin)
+            prims = yield from write_shot(shot, named(character), sampled, own, undrawn, begin, played)
             job = Threaded(
                 lambda say, shot=shot, out=out, look=look: bake(
                     shot,
@@ -216,7 +223,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
 
         def taken(out: Path) -> bool:  # the panel's output is the same for all hair
             players = (thing.name_full for thing in attach.players(str(out)))
-            return any(other != name for other in players) or is_anothers(out, character)
+            return any(other != name for other in players) or bool(owner_of(out, character))
 
         path = untaken(path, label, taken)
         baked, notes, _ = yield from bake_steps(context, named(character), [named(name)], str(path), attached=True)

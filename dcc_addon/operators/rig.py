@@ -26,7 +26,7 @@ from ..services.panel_errors import for_the_panel, with_objects
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
-from .bake import frame_range, is_anothers, output_path, shot_beside
+from .bake import frame_range, output_path, owner_of, shot_beside
 from .base import FILE_ONCE, Hardened, Stepwise, sampled_once, sampling, shown_armature, tell
 
 
@@ -124,7 +124,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         from usd.assets.own_layers import is_own
         from usd.rig.bake import bake_rig
 
-        out = untaken(out, label, lambda path: is_anothers(path, name))
+        out = untaken(out, label, lambda path: bool(owner_of(path, name)))
         shot = shot_beside(out)
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name), share=0.5)

@@ -10,12 +10,13 @@ from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names, skin
 from ..services.threaded import Threaded
 from . import curves
+from .paths import beside
 
 BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
 """The USD basis of each strand type that is not straight lines."""
 
 
-def write_shot(path: Path, armature, sampled, hairs, undrawn=(), share: float = 0.0):
+def write_shot(path: Path, armature, sampled, hairs, undrawn=(), share: float = 0.0, played: bool = False):
     """Steps (done, total, message) of writing the armature's motion, its body and hair at rest. What is in Blender is read before the
     first of them; a thread writes it, because a long shot takes seconds.
 
@@ -26,6 +27,7 @@ def write_shot(path: Path, armature, sampled, hairs, undrawn=(), share: float = 
         hairs: hair objects to write, carried by the armature.
         undrawn: names of those that are invisible in the file.
         share: of longer work that is done before.
+        played: whether this Blender file plays the bake over the shot.
 
     Returns:
         prim path of each object that was written, by name.
@@ -59,6 +61,7 @@ def write_shot(path: Path, armature, sampled, hairs, undrawn=(), share: float = 
             for hair, label in zip(hairs, labels, strict=True)
         ],
         name=armature.name_full,
+        player=beside(path) if played else "",
     )
     prims = {hair.name_full: prim_path(label) for hair, label in zip(hairs, labels, strict=True)}
     prims |= {body: prim_path(skinned.name) for body, skinned in skins.items()}

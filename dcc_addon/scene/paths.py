@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files as properties name them, and libraries whose file is missing."""
 
+import os
+from pathlib import Path
+
 import bpy
 
 from neuralocks_core.errors import NeuralocksError
@@ -28,6 +31,16 @@ def full(path: str, library=None) -> str:
     if path.startswith("//"):
         path = path.replace("\\", "/")
     return bpy.path.abspath(path, library=library)
+
+
+def beside(path) -> str:
+    """How a file is reached from the folder of another at `path`, with slashes; empty if this file is not saved, or on another drive.
+    Both stay together when their folder is moved.
+    """
+    try:
+        return Path(os.path.relpath(bpy.data.filepath, Path(path).parent)).as_posix() if bpy.data.filepath else ""
+    except ValueError:
+        return ""
 
 
 def library_of(thing, setting: str):

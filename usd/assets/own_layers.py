@@ -5,7 +5,7 @@ from pxr import Sdf, Tf
 
 from ..rig.stage import BAKED
 from ..shot.recorded import KEY
-from .scene_writer import ROOT
+from .scene_writer import PLAYER, ROOT
 
 
 def is_own(path) -> bool:
@@ -24,6 +24,14 @@ def character_of(path) -> str:
     layer = _layer(path)
     prim = layer.GetPrimAtPath(ROOT) if layer else None
     return prim.GetInfo("displayName") if prim else ""
+
+
+def player_of(path) -> str:
+    """The file that plays the bake over the shot that a file is, relative to it; empty if the shot does not say."""
+    layer = _layer(path)
+    prim = layer.GetPrimAtPath(ROOT) if layer else None
+    told = prim.customData.get(PLAYER, "") if prim else ""
+    return told if isinstance(told, str) else ""
 
 
 def _layer(path) -> Sdf.Layer | None:

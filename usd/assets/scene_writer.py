@@ -16,6 +16,8 @@ from .prims import Spline, author_curves, author_influences, author_skeleton, bi
 
 ROOT = "/Character"
 RIG = f"{ROOT}/Rig"
+PLAYER = f"{KEY}Player"
+"""Key of the root's customData that names the file which plays the bake."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +77,7 @@ class SceneArrays:
         skins: skinned meshes; shape: weights (T, B) of their blend shapes, mesh after mesh.
         hair: grooms.
         name: what its application calls the character.
+        player: the application's file that plays the bake over this shot, relative to the shot; empty if none does.
     """
 
     metres_per_unit: float
@@ -90,6 +93,7 @@ class SceneArrays:
     shape: np.ndarray
     hair: list[HairArrays]
     name: str = ""
+    player: str = ""
 
 
 def write_scene(path, scene: SceneArrays) -> Path:
@@ -115,6 +119,8 @@ def _author(stage: Usd.Stage, scene: SceneArrays) -> None:
     stage.SetEndTimeCode(float(scene.frames[-1]))
     root = UsdSkel.Root.Define(stage, ROOT)
     root.GetPrim().SetCustomDataByKey(KEY, "shot")  # `own_layers` recognises it by this
+    if scene.player:
+        root.GetPrim().SetCustomDataByKey(PLAYER, scene.player)
     if scene.name:
         root.GetPrim().SetDisplayName(scene.name)
     stage.SetDefaultPrim(root.GetPrim())

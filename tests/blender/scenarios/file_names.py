@@ -34,6 +34,43 @@ def one_output(folder: Path) -> None:
         assert apart(baked, points_at(hairs[name], 9)) < SAME
 
 
+def several_scenes(folder: Path) -> None:
+    """Of versions of a scene, and of scenes in one folder, each goes on playing its own hair, as long as its file is there; a bake that
+    none plays is replaced by the next, and a renamed character's own, too.
+    """
+    needs_usd()
+    rig = scenes.armature()
+    scenes.dance(rig)
+    hair = scenes.hair(rig, 8)
+    files, shown = {}, {}
+    for version, twist in (("v001", 0.0), ("v002", 0.5), ("v003", 1.0)):
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{version}.blend"))
+        rig, hair = bpy.data.objects["Rig"], bpy.data.objects["Hair"]
+        rig.pose.bones["head"].rotation_mode = "XYZ"
+        hair.neuralocks_hair.motion = 1.0 - 0.5 * twist
+        make_live(rig, hair)
+        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}
+        files[version] = hair.modifiers["Neuralocks Cache"].cache_file.filepath
+        shown[version] = points_at(hair, 9)
+        bpy.ops.wm.save_mainfile()
+    assert len(set(files.values())) == 3 and apart(shown["v001"], shown["v003"]) > 100 * SAME
+    assert files["v002"] == "//neuralocks_bake_Hair.usdc", files
+    for version, points in shown.items():
+        bpy.ops.wm.open_mainfile(filepath=str(folder / f"{version}.blend"))
+        assert apart(points_at(bpy.data.objects["Hair"], 9), points) < SAME, version
+
+    rig, hair = bpy.data.objects["Rig"], bpy.data.objects["Hair"]
+    rig.name = "Hero"
+    hair.neuralocks_hair.motion = 1.0
+    assert bpy.ops.neuralocks.bake(filepath=files["v003"]) == {"FINISHED"}
+    assert apart(points_at(hair, 9), shown["v001"]) < SAME
+    written = {path.name for path in folder.iterdir()}
+    rig.name = "Rig"
+    (folder / "v001.blend").unlink()
+    assert bpy.ops.neuralocks.bake() == {"FINISHED"}
+    assert {path.name for path in folder.iterdir()} == written - {"v001.blend"}
+
+
 def like_names(folder: Path) -> None:
     """Hair objects whose plain names would be the same each play their own file, also when they are baked again."""
     needs_usd()
