@@ -214,6 +214,14 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="Rotations of the hair bones from before they were live, as JSON",
         **KEPT,
     )
+    keys_kept: StringProperty(
+        description="Rotations of the hair bones from before they were keyed, as JSON",
+        **KEPT,
+    )
+    keys_alone: StringProperty(
+        description="How the armature's action was set before hair bones were keyed, as JSON",
+        **KEPT,
+    )
     rig_motion: FloatProperty(
         name="Motion",
         description="How much of the motion shows; type up to 2 to exaggerate it",

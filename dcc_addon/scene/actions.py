@@ -24,8 +24,6 @@ KEPT = "neuralocks_rotations"
 """Property of the action that holds the hair bones' earlier rotations."""
 ALONE = "neuralocks_alone"
 """Property of the same action that holds how the artist's action was set; see `alone`."""
-OF = "neuralocks_armature"
-"""Property of both actions that names the armature: it finds them when their tracks were deleted by hand."""
 LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
 """The number of this interpolation: that of many keys is written at once by numbers only."""
 STILL = 1e-6
@@ -45,6 +43,9 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     Returns:
         the action of the hair's motion.
     """
+    settings = armature.neuralocks_character
+    whole = any(KEPT in action for action in _actions(armature))  # otherwise its track was deleted by hand
+    older = ("", "") if whole else (settings.keys_kept, settings.keys_alone)
     _take_off(armature)
     data = armature.animation_data or armature.animation_data_create()
     # The artist's own keys on a bone, which may be in the action above all strips, stay and have no effect.
@@ -61,7 +62,9 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     _strip(data, BEFORE + ending, below)
     action = _action(armature, f"{armature.name} Hair", modes, frames, turns)
     action[KEPT], action[ALONE] = before, alone.keep_alone(data, HAIR)
-    action[OF] = below[OF] = armature.name
+    # If tracks are deleted by hand, the first bake knows the artist's own rotations.
+    settings.keys_kept = rotations.joined(before, older[0])
+    settings.keys_alone = older[1] or action[ALONE]
     _strip(data, TRACK + ending, action)
     return action
 
@@ -128,8 +131,8 @@ def check_mode_left(armature, bones) -> None:
 
 
 def has_keys(armature) -> bool:
-    """Whether there is a bake of its hair bones to remove: its tracks, or at least its actions."""
-    return bool(_tracks(armature) or _orphans(armature))
+    """Whether there is a bake of its hair bones to remove: its tracks, or, if these were deleted by hand, what it did to the bones."""
+    return bool(_tracks(armature) or armature.neuralocks_character.keys_kept)
 
 
 def beside_others(armature) -> bool:
@@ -153,11 +156,10 @@ def remove(armature) -> str:
     file of an overridden character, which Blender would bring back when this file is opened, are muted; returns that file's name,
     empty if there are none.
     """
-    orphans = _orphans(armature)
-    muted = _take_off(armature)
-    for action in reversed(orphans):  # the oldest bake knows the artist's own rotations
-        _give_back(armature, action, keyed=True)
-        _drop(action)
+    muted, settings = _take_off(armature), armature.neuralocks_character
+    rotations.give_back(armature, settings.keys_kept, keyed=True)
+    alone.give_back(armature.animation_data, settings.keys_alone, HAIR)
+    settings.keys_kept = settings.keys_alone = ""
     return muted
 
 
@@ -172,22 +174,11 @@ def _take_off(armature) -> str:
         else:
             armature.animation_data.nla_tracks.remove(track)
     for action in actions:
-        _give_back(armature, action)
-        _drop(action)
+        rotations.give_back(armature, action.get(KEPT, ""))
+        alone.give_back(armature.animation_data, action.get(ALONE, ""), HAIR)
+        if not action.users:  # otherwise somebody keeps it
+            bpy.data.actions.remove(action)
     return muted
-
-
-def _give_back(armature, action, keyed: bool = False) -> None:
-    rotations.give_back(armature, action.get(KEPT, ""), keyed)
-    alone.give_back(armature.animation_data, action.get(ALONE, ""), HAIR)
-
-
-def _drop(action) -> None:
-    """Delete an action, or if somebody keeps it, leave it to them."""
-    if not action.users:
-        bpy.data.actions.remove(action)
-    elif action.library is None:
-        action.pop(OF, None)
 
 
 @contextmanager
@@ -255,12 +246,6 @@ def _library(armature) -> str:
 def _actions(armature, playing: bool = False) -> list:
     tracks = [track for track in _tracks(armature) if not (playing and track.mute)]
     return [strip.action for track in tracks for strip in track.strips if strip.action]
-
-
-def _orphans(armature) -> list:
-    """Actions of bakes of this armature that nothing plays any longer, oldest first."""
-    own = [action for action in bpy.data.actions if action.get(OF) == armature.name and action.library is None]
-    return [action for action in own if action.users <= action.use_fake_user]
 
 
 def _strip(data, name: str, action) -> None:

@@ -45,6 +45,11 @@ def kept_in(text: str) -> dict[str, list]:
     return remembered(text, _fits)
 
 
+def joined(newer: str, older: str) -> str:
+    """What `kept` stored at two times, as one text; of a bone in both, how it was at the earlier time."""
+    return json.dumps(kept_in(newer) | kept_in(older))
+
+
 def give_back(armature, text: str, keyed: bool = False) -> None:
     """Turn the bones that are still there as `kept` found them. With `keyed`, bones that animation has since begun to turn, as
     Blender's Bake Action does, are left to it.

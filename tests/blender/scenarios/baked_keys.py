@@ -289,7 +289,27 @@ def tracks_deleted_by_hand(folder: Path) -> None:
         refused(bpy.ops.neuralocks.remove_keys, "Rig", "no baked hair keys")
         for action in [action for action in bpy.data.actions if "Hair" in action.name]:
             bpy.data.actions.remove(action)
-    bake_and_delete("Neuralocks Hair", "Neuralocks Before Hair")
+    # The character is renamed, copied and saved in between, and another takes its name.
+    both = "Neuralocks Hair", "Neuralocks Before Hair"
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    copy = rig.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    for each in (rig, copy):
+        for name in both:
+            each.animation_data.nla_tracks.remove(each.animation_data.nla_tracks[name])
+    rig.name, copy.name = "Hero", "Stunt"
+    other.name = "Rig"
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "renamed.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "renamed.blend"))
+    bpy.context.scene.neuralocks.armature = bpy.data.objects["Rig"]
+    refused(bpy.ops.neuralocks.remove_keys, "Rig", "no baked hair keys")
+    for name in ("Stunt", "Hero"):
+        rig = bpy.context.scene.neuralocks.armature = bpy.data.objects[name]
+        assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+        for frame, matrices in expected.items():
+            assert apart(bones_at(rig, frame), matrices) < 1e-6, (name, frame)
+    bone = rig.pose.bones["hair.01"]
+    bake_and_delete(*both)
     bone.keyframe_insert("rotation_quaternion", frame=1)
     bone.keyframe_delete("rotation_euler", frame=1)
     bone.keyframe_delete("rotation_euler", frame=24)
