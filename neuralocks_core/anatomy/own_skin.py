@@ -3,10 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.mesh import connected_pieces
-
-WELDED = 1e-4
-"""Points this close [m] count as one: files split a skin along texture seams and between meshes."""
+from neuralocks_core.mesh import welded_pieces
 
 
 def own_skin(
@@ -24,11 +21,7 @@ def own_skin(
         on_joint: which vertices (V,) move mainly with the head's own joint.
         least: size of the smallest head, along each axis [m].
     """
-    # One integer per place: many times faster to sort than triples, and unique within 100 m.
-    with np.errstate(invalid="ignore"):  # a point light years away fits no integer
-        lattice = np.round(points / WELDED).astype(np.int64) @ np.array([1, 1 << 21, 1 << 42])
-    place = np.unique(lattice, return_inverse=True)[1]
-    piece = connected_pieces(place[triangles], len(points))[place]
+    piece = welded_pieces(points, triangles)
     low, high = np.full((2, piece.max() + 1, 3), np.inf)
     np.minimum.at(low, piece[on_head], points[on_head])
     np.minimum.at(high, piece[on_head], -points[on_head])

@@ -9,7 +9,8 @@ from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.kinematics import skin_weights
-from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
+from neuralocks_core.rig.parting import parted
+from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.skinned_body import Body
 
 ROOM = 0.2
@@ -59,7 +60,7 @@ def assemble_rig(
     moving = moving_joints(skeleton, chains)
     body_triangles, points, weights, triangles = [], [], [], []
     start, taken = 0, 0
-    for mesh, (body, moved) in zip(meshes, _parted(meshes, character.of_head, moving)):
+    for mesh, (body, moved) in zip(meshes, parted(character, meshes, moving)):
         body_triangles.append(body + start)
         start += len(mesh.points)
         if not moved.any():
@@ -88,22 +89,3 @@ def assemble_rig(
 def moving_joints(skeleton: Skeleton, chains: HairChains) -> np.ndarray:
     """Which joints (J,) are hair or below hair."""
     return np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
-
-
-def _parted(meshes: list[SkinnedMesh], below: np.ndarray, moving: np.ndarray):
-    """Which triangles are body and which vertices are hair.
-
-    A mesh that moving joints (J,) drive, and nothing that is not `below` (J,) the head, is hair as a whole, including the cap that is
-    tied to the head; in a mesh that is both, triangles that a moving joint touches are hair.
-
-    Returns:
-        for each mesh (triangles of the body (F', 3), mask of hair vertices that move (V,)).
-    """
-    result = []
-    for mesh in meshes:
-        moved = mesh.weight_on(moving) > LEAST_WEIGHT
-        if moved.any() and not (mesh.driven_by(len(below)) & ~below).any() and moved.mean() > 0.2:
-            result.append((np.zeros((0, 3), int), moved))
-        else:
-            result.append((mesh.triangles[~moved[mesh.triangles].any(axis=1)], moved))
-    return result

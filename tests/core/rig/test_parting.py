@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which parts of a rig's meshes are hair and which are body, however the same parts are divided into meshes."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from neuralocks_core.mesh import rays_through
+from neuralocks_core.rig import SkinnedMesh
+from neuralocks_core.rig.parting import parted
+
+from .builders import character, tail
+
+TAILS = [f"hair_{side}" for side in range(6)]
+ANGLES = np.linspace(0.6, 2 * np.pi - 0.6, len(TAILS))
+WHO = character(
+    [row for name, a in zip(TAILS, ANGLES) for row in tail(name, 3, (0.12 * np.sin(a), 1.6, 0.12 * np.cos(a)))]
+)
+LEAVES = [name.rsplit("/", 1)[-1] for name in WHO.skeleton.names]
+CENTRE = WHO.canonical_to_bind[:3, 3] + WHO.head_centre
+
+
+def _ball(radius: float, centre, keep=lambda points: np.ones(len(points), bool)):
+    ball = trimesh.creation.icosphere(3, radius)
+    faces = ball.faces[keep(ball.vertices)[ball.faces].all(axis=1)]
+    used, faces = np.unique(faces, return_inverse=True)
+    return ball.vertices[used] + centre, faces.reshape(-1, 3)
+
+
+def _lock(name: str):
+    """A strip from the cap down its chain, whose first three rows ride on the head."""
+    top = WHO.skeleton.bind[LEAVES.index(f"{name}_1"), :3, 3]
+    rows = top + np.linspace([0, 0.06, 0], [0, -0.12, -0.02], 8)
+    points = np.concatenate([rows, rows + [0.015, 0, 0.015]])
+    first = np.arange(7)
+    faces = np.concatenate([np.stack([first, first + 1, first + 8], 1), np.stack([first + 1, first + 9, first + 8], 1)])
+    return points, faces, 2 * (["head"] * 3 + [f"{name}_1"] * 3 + [f"{name}_2"] * 2)
+
+
+def _parts(dense: bool) -> dict:
+    """Name -> points, triangles, joint of each point. A dense head has more vertices than all hair."""
+    head = _ball(0.1, CENTRE)
+    if dense:
+        finer = trimesh.Trimesh(*head, process=False).subdivide()
+        head = finer.vertices, finer.faces
+    chest = trimesh.creation.box((0.3, 0.3, 0.2))
+    parts = {
+        "torso": (chest.vertices + [0, 1.3, 0], chest.faces, "chest"),
+        "head": (*head, "head"),
+        "eye": (*_ball(0.012, CENTRE + [0.03, 0.02, 0.09]), "head"),
+        "cap": (*_ball(0.11, CENTRE, lambda p: p[:, 1] - p[:, 2] > 0.02), "head"),
+        **{name: _lock(name) for name in TAILS},
+    }
+    return {k: (p, f, [j] * len(p) if isinstance(j, str) else j) for k, (p, f, j) in parts.items()}
+
+
+HAIR = ["cap", *TAILS]
+MOVING = np.array([leaf.startswith("hair") for leaf in LEAVES])
+DIVIDED = {
+    "hair apart": [["torso", "head", "eye"], HAIR],
+    "head apart": [["torso"], ["head", "eye"], HAIR],
+    "head with hair": [["torso"], ["head", "eye", *HAIR]],
+    "cap with body": [["torso", "cap", *TAILS[:1]], ["head", "eye", *TAILS[1:]]],
+    "one mesh": [["torso", "eye", *HAIR, "head"]],
+}
+
+
+def _mesh(parts: dict, names: list[str]):
+    """A mesh of these parts, and which part each vertex is of."""
+    points, faces, joints = zip(*(parts[name] for name in names))
+    counts = [len(each) for each in points]
+    starts = np.cumsum([0, *counts])
+    indices = np.array([LEAVES.index(leaf) for each in joints for leaf in each])[:, None]
+    faces = np.concatenate([each + start for each, start in zip(faces, starts)])
+    return SkinnedMesh("mesh", np.concatenate(points), faces, indices, np.ones(indices.shape)), np.repeat(names, counts)
+
+
+@pytest.mark.parametrize("dense", [False, True])
+@pytest.mark.parametrize("name", DIVIDED)
+def test_hair_and_body_are_the_same_however_they_are_divided(name, dense):
+    parts, counts = _parts(dense), dict.fromkeys(["torso", "head", "eye", *HAIR], 0)
+    meshes, owners = zip(*(_mesh(parts, names) for names in DIVIDED[name]))
+    for owner, (triangles, moved) in zip(owners, parted(WHO, meshes, MOVING)):
+        assert set(owner[moved]) == set(TAILS) & set(owner)
+        for part in owner[triangles[:, 0]]:
+            counts[part] += 1
+    assert counts == {part: 0 if part in HAIR else len(parts[part][1]) for part in counts}
+
+
+def test_hair_without_a_character_is_hair():
+    """Of a cap with locks alone, nothing is body."""
+    mesh, owner = _mesh(_parts(False), HAIR)
+    assert (owner != "cap").mean() > 0.2
+    ((triangles, moved),) = parted(WHO, [mesh], MOVING)
+    assert moved.any() and not len(triangles)
+
+
+def test_rays_pass_through_what_lies_ahead():
+    points = np.array([[-1, -1, 2], [1, -1, 2], [0, 1, 2], [0, 0, -3], [1, 0, -3], [0, 1, -3.0]])
+    ways = np.array([[0, 0, 1.0], [0, 0, -1], [0.2, 0.2, -3], [1, 0, 0]])
+    found = rays_through(points, np.array([[0, 1, 2], [5, 4, 3]]), np.zeros(3), ways)
+    assert sorted(zip(*map(np.ndarray.tolist, found))) == [(0, 0), (2, 1)]
