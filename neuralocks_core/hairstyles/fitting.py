@@ -78,7 +78,7 @@ def fit(grooms: Sequence[Groom], scalp: Scalp, skin: Collider, resize: bool = Tr
     if resize and not _doubt(used, centre, radius) <= DOUBT:
         raise NeuralocksError(
             "groom: its roots are on too small a part of a head to tell how large that is; import it together with the other "
-            "parts of that hair, or give --unit"
+            "parts of that hair, or give --unit; if its strands run from tip to root, reverse them"
         )
     scale, found, moved, off = wanted / radius, [], [], []
     hairy = Collider(scalp.points, scalp.triangles)
@@ -90,11 +90,14 @@ def fit(grooms: Sequence[Groom], scalp: Scalp, skin: Collider, resize: bool = Tr
         far = np.abs(hairy.distance(own - distance[:, None] * normal, limit=np.inf)[0])
         off.append(float(np.mean(far > AWAY * wanted)) if len(own) else 0.0)
         points = (each.points - centre) * scale + middle + np.repeat(onto, each.counts, axis=0)
-        # A thickness that the file did not state is that of hair, whatever the head's size.
-        widths = each.widths if (each.widths == WIDTH).all() else np.float32(scale) * each.widths
-        found.append(replace(each, points=points.astype(np.float32), widths=widths))
+        found.append(replace(each, points=points.astype(np.float32), widths=sized(each.widths, scale)))
         moved.append(np.abs(distance))
     return Fitted(found, scale, np.concatenate(moved), off)
+
+
+def sized(widths: np.ndarray, scale: float) -> np.ndarray:
+    """Widths of hair that is made `scale` times as large. A thickness that no file stated is that of hair, whatever the head's size."""
+    return widths if (widths == WIDTH).all() else np.float32(scale) * widths
 
 
 def _head(roots: np.ndarray, scalp: np.ndarray, radius: float | None) -> tuple[np.ndarray, np.ndarray, float]:

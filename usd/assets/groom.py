@@ -14,6 +14,7 @@ from neuralocks_core.strands.strand_set import root_uv
 from ..baking.header import write_header
 from ..border.arrays import floats, integers, row_matrix
 from ..border.stage_files import write_stage
+from ..shot.curve_ends import Beyond
 from ..shot.curves import find_curves
 from ..skel.stage_rig import StageRig
 from .beside import Beside
@@ -31,11 +32,13 @@ class Authored:
         groom: the strands.
         spline: how a renderer interpolates them.
         beside: what else the curves have.
+        beyond: which of their points lie beyond the ends of what is drawn; None if all are drawn.
     """
 
     groom: Groom
     spline: Spline = POLYLINES
     beside: Beside = Beside()
+    beyond: Beyond | None = None
 
 
 @dataclass(frozen=True)

@@ -14,16 +14,22 @@ from neuralocks_core.flags import flag
 from neuralocks_core.formats.look import Look
 from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
+from neuralocks_core.hairstyles.fitting import sized
 from neuralocks_core.progress import Progress, silent, within
 
+from ..baking.followers import Followers
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import OTHERS, USD, check_not_input, check_not_over, open_stage
+from ..border.stopping import check
 from ..border.units import Border
+from ..shot.curve_ends import beyond_ends
 from ..shot.curves import find_curves, read_groom
 from ..shot.notes import few, first_of, unlikely_head
-from ..shot.stage import read_rigs
+from ..shot.seat_notes import REVERSED
+from ..shot.stage import read_rigs, read_shot
 from ..skel.binding import bound_skeleton, geom_bind
+from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .beside import Beside, Primvar, read_beside
 from .groom import Authored, Over, write_grooms
@@ -122,10 +128,13 @@ def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]
 def _put_on(rig: StageRig, found: list[Authored], resize: bool, say: Progress) -> tuple[list[Authored], str, list[str]]:
     """The hair on a character's head and out of its body, in bind world; how it was put there; notes on roots off the scalp."""
     say(0, len(found), "putting it on the head")
-    fitted, on, laid = Barber(rig.character).fitted([each.groom for each in found], resize), [], []
+    drawn = [each.groom if each.beyond is None else each.beyond.left_out(each.groom) for each in found]
+    fitted, on, laid = Barber(rig.character).fitted(drawn, resize), [], []
     for number, (each, groom) in enumerate(zip(found, fitted.grooms)):
         say(number, len(found), f"taking {groom.name} out of the body")
         groom, moved = freed(groom, rig.character)
+        if each.beyond is not None:
+            groom = _with_ends(each, groom, fitted.scale, rig.character.facing)
         on.append(replace(each, groom=groom))
         laid.append(moved)
     laid = np.concatenate(laid)
@@ -139,12 +148,19 @@ def _put_on(rig: StageRig, found: list[Authored], resize: bool, say: Progress) -
         told += f", and {(laid > 1e-3).sum()} that went into the body were laid over it, by {1e3 * laid.max():.0f} mm at most"
     elsewhere = [
         f"{each.groom.name}: {100 * off:.0f}% of its roots lie off the scalp, on the face, the neck or the body; if they do not "
-        "belong there, turn the hair to face forward (+Z if Y is up, -Y if Z is), check --up, or import it together with the "
-        "other parts of that hair"
+        "belong there, turn the hair to face forward (+Z if Y is up, -Y if Z is), check --up, import it together with the other "
+        "parts of that hair, or reverse its strands if they run from tip to root"
         for each, off in zip(found, fitted.off)
         if off > _OFF
     ]
     return on, told, elsewhere
+
+
+def _with_ends(each: Authored, drawn: Groom, scale: float, facing: np.ndarray) -> Groom:
+    """All points of curves whose drawn ones are on a head, made `scale` times as large: those beyond the ends go with them."""
+    points = np.empty_like(each.groom.points)
+    Followers(each.beyond, each.groom.points, scale * facing.T).put(drawn.points, 0, np.eye(3), None, points)
+    return replace(each.groom, points=points, widths=sized(each.groom.widths, scale))
 
 
 def _primvars(look: Look) -> tuple[Primvar, ...]:
@@ -179,8 +195,21 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
     for prim in find_curves(stage):
         curves = UsdGeom.BasisCurves(prim)
         groom = read_groom(prim, border.to_core @ _place(prim), notes)
+        if curves.GetWidthsAttr().ValueMightBeTimeVarying():
+            notes.append(f"{prim.GetPath()}: its widths change over time; the first ones are imported")
         tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
-        found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left)))
+        found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left), beyond_ends(prim)))
     if not found:
         raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
-    return found, notes + few(left, "primvars and materials are not imported like that")
+    return found, notes + _reversed(source, stage) + few(left, "primvars and materials are not imported like that")
+
+
+def _reversed(source: Path, stage: Usd.Stage) -> list[str]:
+    """The notes on strands that run from tip to root, if the file has the skin that they grow on."""
+    if not find_skeletons(stage):
+        return []
+    try:
+        return [note for note in read_shot(source).notes if REVERSED in note]
+    except NeuralocksError:  # whatever is wrong with its characters, its curves are imported
+        check()
+        return []

@@ -13,6 +13,8 @@ from ..skel.stage_rig import StageRig
 from .curve_ends import Beyond
 from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends, some_places
 
+REVERSED = "seem to run from tip to root"
+"""What the note on such strands says."""
 TOUCHES = 0.003
 """Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
 COARSE = 2e-4
@@ -57,7 +59,7 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
     if last > NEAR or not first:
         return []
     return [
-        f"{prim.GetPath()}: its strands seem to run from tip to root: their last points lie on the skin of {rig.path}, "
+        f"{prim.GetPath()}: its strands {REVERSED}: their last points lie on the skin of {rig.path}, "
         f"their first ones {first:.2g} m away; reverse the strands"
     ]
 

@@ -55,6 +55,49 @@ def test_hair_is_put_back_where_it_grew(fitted, foreign, tmp_path):
     assert any("put on the head of /Body/Rig, made 0.0269 times as large; strands" in note for note in notes), notes
 
 
+@pytest.mark.parametrize("basis", ["catmullRom", "bspline"])
+def test_curves_are_put_on_a_head_by_what_is_drawn_of_them(basis, foreign, fitted, tmp_path):
+    """Points beyond the ends of curves that are not pinned lie in the skull: they go with the hair, and do not seat it."""
+    (own,), _ = import_groom(foreign, tmp_path / "own.usda")
+    count = int(own.counts[0])
+    points = own.points.reshape(-1, count, 3)
+    ends = [2 * points[:, :1] - points[:, 1:2], points, 2 * points[:, -1:] - points[:, -2:-1]]
+    more = np.concatenate(ends, axis=1)
+    widths = np.repeat(own.widths[:1], more.shape[0] * more.shape[1])
+    path = write_groom(tmp_path / "more.usda", Groom("Bob", more.reshape(-1, 3), own.counts + 2, widths))
+    stage = Usd.Stage.Open(str(path))
+    (prim,) = (prim for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves))
+    curves = UsdGeom.BasisCurves(prim)
+    curves.GetTypeAttr().Set("cubic")
+    curves.CreateBasisAttr(basis)
+    curves.CreateWrapAttr("nonperiodic")
+    curves.GetWidthsAttr().Set(curves.GetWidthsAttr().Get(), 1.0)
+    curves.GetWidthsAttr().Set(curves.GetWidthsAttr().Get(), 2.0)
+    stage.Save()
+    (groom,), notes = import_groom(path, tmp_path / "on.usda", character=BODY)
+    assert (
+        any("its widths change over time" in note for note in notes) == curves.GetWidthsAttr().ValueMightBeTimeVarying()
+    )
+    on = groom.points.reshape(more.shape)
+    np.testing.assert_allclose(on[:, 1:-1], fitted[0].points.reshape(points.shape), atol=1e-4)
+    for outer, near in ((0, 1), (-1, -2)):
+        before, after = (np.linalg.norm(p[:, outer] - p[:, near], axis=1) for p in (more, on))
+        np.testing.assert_allclose(after, np.median(after / before) * before, rtol=1e-3, atol=1e-6)
+        assert np.median(after / before) == pytest.approx(0.0269, rel=0.01)
+
+
+def test_hair_from_tip_to_root_is_told_where_the_file_has_its_skin(tmp_path):
+    def turn(stage):
+        points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+        points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(np.array(points.Get())[::-1])))
+
+    told = [
+        any("run from tip to root" in note for note in import_groom(shot, tmp_path / f"{name}.usda")[1])
+        for name, shot in (("as it is", write_shot(tmp_path)), ("turned", edited(tmp_path / "other", turn)))
+    ]
+    assert told == [False, True]
+
+
 def test_a_beard_does_not_move_the_hair_it_is_imported_with(foreign, fitted, tmp_path):
     """Its roots are far from the skull's sphere: the hair became a fifth smaller, and the beard sat below the eyes."""
     rig = read_rigs(BODY)[0]
