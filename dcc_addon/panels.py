@@ -14,12 +14,15 @@ from .scene import imported
 from .scene.actions import has_keys
 from .scene.attach import has_cache, retimed_since
 from .scene.particles import waiting
+from .scene.paths import usual_output
 from .services.panel_errors import for_the_panel
 from .services.remaining import in_words
 from .services.sliders import SLIDERS
 from .session import session
 
 RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
+PLACEHOLDERS = "placeholder" in bpy.types.UILayout.bl_rna.functions["prop"].parameters
+"""Whether this Blender shows in an empty field what is taken instead."""
 _findings: dict[tuple, tuple[list, str]] = {}
 
 
@@ -245,8 +248,8 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
             column.prop(settings, "frame_start")
             column.prop(settings, "frame_end")
         layout.prop(settings, "subframes")
-        layout.prop(settings, "output")
-        if settings.output.startswith("//") and not bpy.data.filepath:
+        layout.prop(settings, "output", **({"placeholder": usual_output()} if PLACEHOLDERS else {}))
+        if not bpy.data.filepath and (not settings.output.strip() or settings.output.startswith("//")):
             words(layout, "Save this file first, or choose a full path", "INFO")
         layout.operator("neuralocks.bake", icon="EXPORT")
         row = layout.row(align=True)

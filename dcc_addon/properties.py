@@ -260,8 +260,10 @@ class SceneSettings(bpy.types.PropertyGroup):
     )
     output: StringProperty(
         name="Output",
-        description="Where the bake is written, with its shot beside it (NAME_shot.usdc); // is the folder of this file",
-        default="//neuralocks_bake.usdc",
+        description=(
+            "Where the bake is written, with its shot beside it (NAME_shot.usdc); // is the folder of this file. If empty, there and "
+            "named after this file"
+        ),
         **FILE,
     )
     train_minutes: FloatProperty(

@@ -19,7 +19,7 @@ from ..scene.carried import hairs_of
 from ..scene.export import write_shot
 from ..scene.lookup import find, named
 from ..scene.muting import on_top
-from ..scene.paths import absolute, beside
+from ..scene.paths import absolute, beside, usual_output
 from ..scene.riding import on_hair_bone
 from ..scene.shown import in_renders
 from ..services.names import file_label
@@ -33,15 +33,13 @@ from .base import FILE_ONCE, Stepwise, sampling, shown_armature, shown_hair, tel
 
 
 def output_path(path: str) -> str:
-    """Absolute path of a bake.
+    """Absolute path of a bake; if none is chosen, `usual_output`.
 
     Raises:
         NeuralocksError: it is relative to a file that is not saved, it is a folder, its folder cannot be written, or its name is too
             long.
     """
-    if not path.strip():
-        raise NeuralocksError("Output: no file is named; choose where the bake is written")
-    chosen = absolute(path)
+    chosen = absolute(path if path.strip() else usual_output())
     full = os.path.abspath(chosen)
     if chosen.endswith(("/", os.sep)) or os.path.isdir(full):
         raise NeuralocksError(f"{path}: this is a folder; name a file in it")

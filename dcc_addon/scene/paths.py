@@ -33,6 +33,11 @@ def full(path: str, library=None) -> str:
     return bpy.path.abspath(path, library=library)
 
 
+def usual_output() -> str:
+    """Where a bake is written if nothing else is chosen: beside this file and named after it, so that no other scene's is replaced."""
+    return f"//{Path(bpy.data.filepath).stem or 'untitled'}_hair.usdc"
+
+
 def beside(path) -> str:
     """How a file is reached from the folder of another at `path`, with slashes; empty if this file is not saved, or on another drive.
     Both stay together when their folder is moved.

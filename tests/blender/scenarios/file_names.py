@@ -35,11 +35,12 @@ def one_output(folder: Path) -> None:
 
 
 def several_scenes(folder: Path) -> None:
-    """Of versions of a scene, and of scenes in one folder, each goes on playing its own hair, as long as its file is there; a bake that
-    none plays is replaced by the next, and a renamed character's own, too.
+    """Of versions of a scene that have one output, each goes on playing its own hair, as long as its file is there; a bake that none
+    plays is replaced by the next, and a renamed character's own, too. If no output is chosen, each scene's has its name.
     """
     needs_usd()
     rig = scenes.armature()
+    bpy.context.scene.neuralocks.output = "//one.usdc"
     scenes.dance(rig)
     hair = scenes.hair(rig, 8)
     files, shown = {}, {}
@@ -54,7 +55,7 @@ def several_scenes(folder: Path) -> None:
         shown[version] = points_at(hair, 9)
         bpy.ops.wm.save_mainfile()
     assert len(set(files.values())) == 3 and apart(shown["v001"], shown["v003"]) > 100 * SAME
-    assert files["v002"] == "//neuralocks_bake_Hair.usdc", files
+    assert files["v002"] == "//one_Hair.usdc", files
     for version, points in shown.items():
         bpy.ops.wm.open_mainfile(filepath=str(folder / f"{version}.blend"))
         assert apart(points_at(bpy.data.objects["Hair"], 9), points) < SAME, version
@@ -69,6 +70,9 @@ def several_scenes(folder: Path) -> None:
     (folder / "v001.blend").unlink()
     assert bpy.ops.neuralocks.bake() == {"FINISHED"}
     assert {path.name for path in folder.iterdir()} == written - {"v001.blend"}
+    bpy.context.scene.neuralocks.output = ""
+    assert bpy.ops.neuralocks.bake() == {"FINISHED"}
+    assert {path.name for path in folder.iterdir()} - written == {"v003_hair.usdc", "v003_hair_shot.usdc"}
 
 
 def like_names(folder: Path) -> None:

@@ -36,15 +36,15 @@ def imported_moving(folder: Path) -> None:
 def imported_from_is_kept(folder: Path) -> None:
     """A bake to the file, or to the shot, from which something was imported is written beside it: what plays it stays as it is."""
     needs_usd()
-    operators, rig, out = bpy.ops.neuralocks, scenes.armature(), folder / "neuralocks_bake.usdc"
+    operators, rig, out = bpy.ops.neuralocks, scenes.armature(), folder / "anna_hair.usdc"
     scenes.dance(rig)
     make_live(rig, scenes.hair(rig, 20))
     assert operators.bake(filepath=str(out)) == {"FINISHED"}
-    shot = folder / "neuralocks_bake_shot.usdc"
+    shot = folder / "anna_hair_shot.usdc"
     for source in (out, shot):
         scenes.empty()
         bpy.ops.wm.usd_import(filepath=str(source))
-        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))  # the panel's output is beside it
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "anna.blend"))  # the panel's output is beside it
         rig, strands = (next(o for o in bpy.data.objects if o.type == kind) for kind in ("ARMATURE", "CURVES"))
         make_live(rig, strands)
         before, live = (out.read_bytes(), shot.read_bytes()), points_at(strands, 9)
