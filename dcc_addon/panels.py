@@ -21,8 +21,6 @@ from .services.sliders import SLIDERS
 from .session import session
 
 RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
-PLACEHOLDERS = "placeholder" in bpy.types.UILayout.bl_rna.functions["prop"].parameters
-"""Whether this Blender shows in an empty field what is taken instead."""
 _findings: dict[tuple, tuple[list, str]] = {}
 
 
@@ -248,7 +246,7 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
             column.prop(settings, "frame_start")
             column.prop(settings, "frame_end")
         layout.prop(settings, "subframes")
-        layout.prop(settings, "output", **({"placeholder": usual_output()} if PLACEHOLDERS else {}))
+        layout.prop(settings, "output", **hint(usual_output()))
         if not bpy.data.filepath and (not settings.output.strip() or settings.output.startswith("//")):
             words(layout, "Save this file first, or choose a full path", "INFO")
         layout.operator("neuralocks.bake", icon="EXPORT")
