@@ -71,26 +71,28 @@ def _parts(character: Character, mesh: SkinnedMesh, moves: np.ndarray) -> list[_
     face, outside = (mesh.weight_on(joints) > LEAST_WEIGHT for joints in (of_face, ~character.of_head))
     piece = welded_pieces(mesh.points, mesh.triangles)
     count = piece.max() + 1
-    skin = np.bincount(piece, (face | outside) & ~moves, count) + _with_face(character, mesh, piece, count) > 0
+    on_head = mesh.triangles[~(outside | moves)[mesh.triangles].any(axis=1)]
+    with_face = _with_face(character, mesh.points, on_head, piece)
+    skin = (np.bincount(piece, (face | outside) & ~moves, count) > 0) | with_face
     among_hair = moves.mean() > MOSTLY and not outside.any() and not skin.any()
     hair = (np.bincount(piece, moves, count) > 0) | among_hair
     still = np.flatnonzero(~moves)
     still = still[np.argsort(piece[still], kind="stable")]
     found = []
     for vertices in np.split(still, np.flatnonzero(np.diff(piece[still])) + 1) if len(still) else ():
-        size, on_head = _size(mesh.points[vertices]), _size(mesh.points[vertices[~outside[vertices]]])
-        number = piece[vertices[0]]
-        found.append(_Part(vertices, size, on_head, bool(skin[number]), bool(hair[number])))
+        number, riding = piece[vertices[0]], vertices[~outside[vertices]]
+        sizes = _size(mesh.points[vertices]), _size(mesh.points[riding])
+        found.append(_Part(vertices, *sizes, bool(skin[number]), bool(hair[number])))
     return found
 
 
-def _with_face(character: Character, mesh: SkinnedMesh, piece: np.ndarray, count: int) -> np.ndarray:
-    """Which pieces (count,) lie in the directions of the face."""
+def _with_face(character: Character, points: np.ndarray, triangles: np.ndarray, piece: np.ndarray) -> np.ndarray:
+    """Which pieces, of which each point has the number, lie with their triangles in the directions of the face."""
     aside, down = np.radians(np.meshgrid(ASIDE, DOWN)).reshape(2, -1)
     ways = np.stack([np.sin(aside) * np.cos(down), -np.sin(down), np.cos(aside) * np.cos(down)], axis=1)
-    ray, triangle = rays_through(character.canonical(mesh.points), mesh.triangles, character.head_centre, ways)
-    hit = np.zeros((len(ways), count), bool)
-    hit[ray, piece[mesh.triangles[triangle, 0]]] = True
+    ray, triangle = rays_through(character.canonical(points), triangles, character.head_centre, ways)
+    hit = np.zeros((len(ways), piece.max() + 1), bool)
+    hit[ray, piece[triangles[triangle, 0]]] = True
     return hit.mean(axis=0) > FACE
 
 
