@@ -73,9 +73,10 @@ def owner_of(out: Path, character: str) -> str:
     if not shot.is_file():
         return ""
     other, player = character_of(shot), player_of(shot)
-    if player and player != beside(shot) and (shot.parent / player).is_file():
-        return f"{player}, which plays it"
     own = any(thing.neuralocks_hair.armature == find(character) for thing in attach.players(str(out)))  # renamed since
+    there = os.path.isfile(os.path.normpath(shot.parent / player))  # as it was written, whatever folder is a link
+    if player and player != beside(shot) and (there or not own):  # it may have been moved
+        return f"{player}, which plays it"
     return "" if own or other in ("", character) else f"another character, {other}"
 
 

@@ -132,7 +132,14 @@ def check_mode_left(armature, bones) -> None:
 
 def has_keys(armature) -> bool:
     """Whether there is a bake of its hair bones to remove: its tracks, or, if these were deleted by hand, what it did to the bones."""
-    return bool(_tracks(armature) or armature.neuralocks_character.keys_kept)
+    if _tracks(armature):
+        return True
+    data = armature.animation_data
+    strips = [strip for track in data.nla_tracks for strip in track.strips] if data else []
+    elsewhere = any(
+        strip.action and KEPT in strip.action for strip in strips
+    )  # the artist renamed the track, and has it
+    return bool(armature.neuralocks_character.keys_kept) and not elsewhere
 
 
 def beside_others(armature) -> bool:
@@ -174,7 +181,7 @@ def _take_off(armature) -> str:
         else:
             armature.animation_data.nla_tracks.remove(track)
     for action in actions:
-        rotations.give_back(armature, action.get(KEPT, ""))
+        rotations.give_back(armature, action.get(KEPT, ""), keyed=not muted)
         alone.give_back(armature.animation_data, action.get(ALONE, ""), HAIR)
         if not action.users:  # otherwise somebody keeps it
             bpy.data.actions.remove(action)

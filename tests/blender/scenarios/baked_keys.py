@@ -308,6 +308,15 @@ def tracks_deleted_by_hand(folder: Path) -> None:
         assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
         for frame, matrices in expected.items():
             assert apart(bones_at(rig, frame), matrices) < 1e-6, (name, frame)
+    # A track that was renamed is the artist's.
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    data = rig.animation_data
+    for name in both:
+        data.nla_tracks[name].name = f"My {name}"
+    refused(bpy.ops.neuralocks.remove_keys, "Hero", "no baked hair keys")
+    for name in both:
+        data.nla_tracks.remove(data.nla_tracks[f"My {name}"])
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"} and apart(bones_at(rig, 9), expected[9]) < 1e-6
     bone = rig.pose.bones["hair.01"]
     bake_and_delete(*both)
     bone.keyframe_insert("rotation_quaternion", frame=1)

@@ -35,7 +35,7 @@ def one_output(folder: Path) -> None:
 
 
 def several_scenes(folder: Path) -> None:
-    """Of versions of a scene that have one output, each goes on playing its own hair, as long as its file is there; a bake that none
+    """Of versions of a scene that have one output, each goes on playing its own hair, also if its file was renamed; a bake that none
     plays is replaced by the next, and a renamed character's own, too. If no output is chosen, each scene's has its name.
     """
     needs_usd()
@@ -67,12 +67,18 @@ def several_scenes(folder: Path) -> None:
     assert apart(points_at(hair, 9), shown["v001"]) < SAME
     written = {path.name for path in folder.iterdir()}
     rig.name = "Rig"
-    (folder / "v001.blend").unlink()
-    assert bpy.ops.neuralocks.bake() == {"FINISHED"}
-    assert {path.name for path in folder.iterdir()} == written - {"v001.blend"}
+    (folder / "v001.blend").rename(folder / "final.blend")
+    for _ in range(2):
+        assert bpy.ops.neuralocks.bake() == {"FINISHED"}
     bpy.context.scene.neuralocks.output = ""
     assert bpy.ops.neuralocks.bake() == {"FINISHED"}
-    assert {path.name for path in folder.iterdir()} - written == {"v003_hair.usdc", "v003_hair_shot.usdc"}
+    added = {path.name for path in folder.iterdir()} - written - {"final.blend"}
+    assert added == {f"{stem}{end}.usdc" for stem in ("one_Rig", "v003_hair") for end in ("", "_shot")}, added
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "final.blend"))
+    assert apart(points_at(bpy.data.objects["Hair"], 9), shown["v001"]) < SAME
+    bpy.data.objects["Hair"].neuralocks_hair.motion = 0.5
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}
+    assert bpy.data.objects["Hair"].modifiers["Neuralocks Cache"].cache_file.filepath == files["v001"]
 
 
 def like_names(folder: Path) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import bpy
 
+from dcc_addon.scene import rotations
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, bones_at, choose, give_bone_model, messages, refused
 
@@ -191,3 +192,12 @@ def baked_by_blender(folder: Path) -> None:
     tail.keyframe_insert("rotation_axis_angle", frame=5)
     own.rig_live = False
     assert tail.rotation_mode == "XYZ"
+
+    rig.animation_data_clear()
+    scenes.dance(rig)
+    tail.rotation_mode = "XYZ"
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}
+    mode = tail.rotation_mode
+    tail.keyframe_insert(rotations.CHANNELS[mode], frame=5)  # below the baked keys
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"} and bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
+    assert tail.rotation_mode == mode != "XYZ"
