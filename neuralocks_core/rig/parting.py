@@ -17,7 +17,8 @@ FACE = 0.5
 CAP = 0.5
 """Size of the smallest cap of hair, relative to the head."""
 MOSTLY = 0.2
-"""If joints of the hair move more than this share of a mesh without skin, what does not move is hair, too."""
+"""If joints of the hair move more than this share of a mesh that only the head drives, and that has no face, all of it is hair, with
+ribbons and pins."""
 
 
 def parted(character: Character, meshes: list[SkinnedMesh], moving: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -25,8 +26,8 @@ def parted(character: Character, meshes: list[SkinnedMesh], moving: np.ndarray) 
 
     The roots of locks, and the cap that they grow from, ride on the head as its skin does, and each may be in any mesh. So what does
     not move of each connected piece is judged by itself: skin goes on below the head, is moved by joints of the face, or has the
-    face. Otherwise it is hair if the rest of its piece is, or much of a mesh without skin, or if it is large enough to be a cap; eyes,
-    ears and horns are not.
+    face. Otherwise it is hair if the rest of its piece is, or if it is large enough to be a cap; eyes, ears and horns are not. A mesh
+    of hair alone is hair as a whole.
 
     Args:
         character: skeleton and head.
@@ -73,8 +74,8 @@ def _parts(character: Character, mesh: SkinnedMesh, moves: np.ndarray) -> list[_
     count = piece.max() + 1
     on_head = mesh.triangles[~(outside | moves)[mesh.triangles].any(axis=1)]
     with_face = _with_face(character, mesh.points, on_head, piece)
-    skin = (np.bincount(piece, (face | outside) & ~moves, count) > 0) | with_face
-    among_hair = moves.mean() > MOSTLY and not outside.any() and not skin.any()
+    among_hair = moves.mean() > MOSTLY and not outside.any() and not with_face.any()
+    skin = ((np.bincount(piece, (face | outside) & ~moves, count) > 0) | with_face) & ~np.bool_(among_hair)
     hair = (np.bincount(piece, moves, count) > 0) | among_hair
     still = np.flatnonzero(~moves)
     still = still[np.argsort(piece[still], kind="stable")]

@@ -15,6 +15,7 @@ TAILS = [f"hair_{side}" for side in range(6)]
 ANGLES = np.linspace(0.6, 2 * np.pi - 0.6, len(TAILS))
 WHO = character(
     [row for name, a in zip(TAILS, ANGLES) for row in tail(name, 3, (0.12 * np.sin(a), 1.6, 0.12 * np.cos(a)))]
+    + [("ribbon", "head", (0, 1.7, -0.1))]
 )
 LEAVES = [name.rsplit("/", 1)[-1] for name in WHO.skeleton.names]
 CENTRE = WHO.canonical_to_bind[:3, 3] + WHO.head_centre
@@ -48,6 +49,8 @@ def _parts(dense: bool) -> dict:
         "torso": (chest.vertices + [0, 1.3, 0], chest.faces, "chest"),
         "head": (*head, "head"),
         "eye": (*_ball(0.012, CENTRE + [0.03, 0.02, 0.09]), "head"),
+        "bow": (0.2 * chest.vertices + CENTRE + [0, 0.1, -0.12], chest.faces, "ribbon"),
+        "card": (*_lock(TAILS[2])[:2], "head"),
         "cap": (*_ball(0.11, CENTRE, lambda p: p[:, 1] - p[:, 2] > 0.02), "head"),
         **{name: _lock(name) for name in TAILS},
     }
@@ -85,6 +88,14 @@ def test_hair_and_body_are_the_same_however_they_are_divided(name, dense):
         for part in owner[triangles[:, 0]]:
             counts[part] += 1
     assert counts == {part: 0 if part in HAIR else len(parts[part][1]) for part in counts}
+
+
+def test_of_a_mesh_of_hair_all_is_hair():
+    """With what is worn in it, and cards on the head that nothing moves."""
+    parts = _parts(False)
+    skin, hair = (_mesh(parts, names)[0] for names in (["torso", "head", "eye"], [*HAIR, "bow", "card"]))
+    (body, _), (own, _) = parted(WHO, [skin, hair], MOVING)
+    assert len(body) == len(skin.triangles) and not len(own)
 
 
 def test_hair_without_a_character_is_hair():
