@@ -45,15 +45,19 @@ def welded_pieces(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def rays_through(
     points: np.ndarray, triangles: np.ndarray, start: np.ndarray, ways: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the rays from a point (3,) along ways (R, 3) pass through which triangles (F, 3) of points (V, 3): pairs of indices, two
-    arrays (H,) int.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the rays from a point (3,) along unit vectors `ways` (R, 3) pass through triangles (F, 3) of points (V, 3).
+
+    Returns:
+        indices (H,) of ray and triangle, and the distance (H,) from the start.
     """
     # A ray passes through a triangle if it sees all three of its edges on the same side.
     a, b, c = (np.asarray(points, float)[corner] - start for corner in triangles.T)
     sides = np.stack([ways @ np.cross(p, q).T for p, q in ((a, b), (b, c), (c, a))])
     ahead = ways @ (a + b + c).T > 0
-    return np.nonzero(ahead & ((sides > 0).all(axis=0) | (sides < 0).all(axis=0)))
+    ray, triangle = np.nonzero(ahead & ((sides > 0).all(axis=0) | (sides < 0).all(axis=0)))
+    normal = np.cross(b - a, c - a)[triangle]
+    return ray, triangle, (a[triangle] * normal).sum(axis=1) / (ways[ray] * normal).sum(axis=1)
 
 
 def inside_out(points: np.ndarray, triangles: np.ndarray) -> bool:

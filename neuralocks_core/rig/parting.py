@@ -10,24 +10,38 @@ from neuralocks_core.mesh import rays_through, welded_pieces
 from neuralocks_core.rig.hair_names import says_face
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 
-ASIDE, DOWN = (-30, 0, 30), (5, 20, 35, 50)
-"""Directions from the middle of the head to the face, to the side and below the horizon [degrees]: fringes seldom reach there."""
-FACE = 0.5
-"""Share of these directions in which a piece lies that is the skin of a face."""
-CAP = 0.5
-"""Size of the smallest cap of hair, relative to the head."""
 MOSTLY = 0.2
-"""If joints of the hair move more than this share of a mesh that only the head drives, and that has no face, all of it is hair, with
-ribbons and pins."""
+"""If joints of the hair move more than this share of a mesh without skin, all of it is hair, with ribbons and pins."""
+MAINLY = 0.5
+"""Skin weight above which joints decide what a vertex belongs to: automatic weights bleed."""
+FACE = 0.3
+"""Share of the directions of the face in which a piece is the innermost that is the skin there: eyes and teeth are in fewer."""
+CROWN = 0.5
+"""Share of the directions of the crown that a cap of hair covers: horns, ears and glasses are in fewer."""
+HAT = 0.5
+"""Diagonal of the box around the largest cap, on a human [m]."""
+
+
+def _ways(*directions: tuple[tuple, tuple]) -> np.ndarray:
+    """Unit vectors (n, 3) at all pairs of azimuths, from +Z to +X, and elevations [degrees]."""
+    found = [np.radians(np.meshgrid(*each)).reshape(2, -1) for each in directions]
+    aside, up = np.concatenate(found, axis=1)
+    return np.stack([np.sin(aside) * np.cos(up), np.sin(up), np.cos(aside) * np.cos(up)], axis=1)
+
+
+TO_FACE = _ways(((-30, 0, 30), (-5, -20, -35, -50)))
+"""Directions from the middle of the head in which fringes seldom are."""
+TO_CROWN = _ways(((-135, -90, 90, 135, 180), (25, 55)), ((0,), (85,)))
+"""Directions from there in which there is no face."""
 
 
 def parted(character: Character, meshes: list[SkinnedMesh], moving: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Which triangles are body and which vertices are hair that moves.
 
-    The roots of locks, and the cap that they grow from, ride on the head as its skin does, and each may be in any mesh. So what does
-    not move of each connected piece is judged by itself: skin goes on below the head, is moved by joints of the face, or has the
-    face. Otherwise it is hair if the rest of its piece is, or if it is large enough to be a cap; eyes, ears and horns are not. A mesh
-    of hair alone is hair as a whole.
+    The roots of locks, and the cap that they grow from, ride on the head as its skin does, and each may be in any mesh. So each
+    connected piece of a mesh with locks is judged by itself: what goes on below the head is skin, and what is moved by joints of the
+    face, or is the innermost where the face is; else a piece that moves is hair, roots included, and so is a cap; eyes, ears and
+    horns are not. A mesh of hair alone is hair as a whole.
 
     Args:
         character: skeleton and head.
@@ -37,70 +51,77 @@ def parted(character: Character, meshes: list[SkinnedMesh], moving: np.ndarray) 
     Returns:
         for each mesh, triangles (F', 3) of the body and a mask (V,) of hair.
     """
-    moved = [mesh.weight_on(moving) > LEAST_WEIGHT for mesh in meshes]
-    parts = [_parts(character, mesh, moves) if moves.any() else [] for mesh, moves in zip(meshes, moved)]
-    sizes = [_size(_on_head(character, mesh)) for mesh, moves in zip(meshes, moved) if not moves.any()]
-    head = max([*sizes, *(part.size_on_head for own in parts for part in own if part.skin)], default=0.0)
+    every = [_Pieces.of(character, mesh, moving) for mesh in meshes]
+    if not any(own.moves.any() for own in every):
+        return [(mesh.triangles, own.moves) for mesh, own in zip(meshes, every)]
     result = []
-    for mesh, moves, own in zip(meshes, moved, parts):
-        body = ~moves
-        for part in own:
-            body[part.vertices] = part.skin or not (part.hair or part.size > CAP * head)
-        result.append((mesh.triangles[body[mesh.triangles].all(axis=1)], moves))
+    for mesh, own, face in zip(meshes, every, _with_face(character, meshes, every)):
+        skin = own.goes_on | face
+        if not own.hairy.any():
+            body = ~own.moves
+        elif own.moves.mean() > MOSTLY and not skin.any():
+            body = np.zeros(len(mesh.points), bool)
+        else:
+            body = (skin | own.of_face | ~(own.hairy | _caps(character, mesh, own)))[own.number] & ~own.moves
+        result.append((mesh.triangles[body[mesh.triangles].all(axis=1)], own.moves))
     return result
 
 
 @dataclass(frozen=True)
-class _Part:
-    """What does not move of one connected piece of a mesh.
+class _Pieces:
+    """The connected pieces of a mesh.
 
     Attributes:
-        vertices: (N,) int.
-        size, size_on_head: diagonals of the box around it, and around what rides on the head alone [m].
-        skin, hair: whether it certainly is one of these.
+        number: of the piece that each vertex is in, (V,).
+        moves: vertices (V,) that joints of the hair move.
+        riding: triangles (F', 3) that ride on the head and do not move.
+        goes_on, of_face, hairy: pieces (n,) that joints outside the head drive, of the face, or of the hair.
     """
 
-    vertices: np.ndarray
-    size: float
-    size_on_head: float
-    skin: bool
-    hair: bool
+    number: np.ndarray
+    moves: np.ndarray
+    riding: np.ndarray
+    goes_on: np.ndarray
+    of_face: np.ndarray
+    hairy: np.ndarray
+
+    @classmethod
+    def of(cls, character: Character, mesh: SkinnedMesh, moving: np.ndarray) -> "_Pieces":
+        faces = np.array([says_face(name) for name in character.skeleton.names])
+        number = welded_pieces(mesh.points, mesh.triangles) if len(mesh.points) else np.zeros(0, int)
+        moves, outside = mesh.weight_on(moving) > LEAST_WEIGHT, mesh.weight_on(~character.of_head) > MAINLY
+        driven = (outside, mesh.weight_on(faces) > MAINLY, mesh.weight_on(moving) > MAINLY)
+        count = number.max(initial=-1) + 1
+        riding = mesh.triangles[~(moves | outside)[mesh.triangles].any(axis=1)]
+        return cls(number, moves, riding, *(np.bincount(number, vertices, count) > 0 for vertices in driven))
 
 
-def _parts(character: Character, mesh: SkinnedMesh, moves: np.ndarray) -> list[_Part]:
-    of_face = np.array([says_face(name) for name in character.skeleton.names])
-    face, outside = (mesh.weight_on(joints) > LEAST_WEIGHT for joints in (of_face, ~character.of_head))
-    piece = welded_pieces(mesh.points, mesh.triangles)
-    count = piece.max() + 1
-    on_head = mesh.triangles[~(outside | moves)[mesh.triangles].any(axis=1)]
-    with_face = _with_face(character, mesh.points, on_head, piece)
-    among_hair = moves.mean() > MOSTLY and not outside.any() and not with_face.any()
-    skin = ((np.bincount(piece, (face | outside) & ~moves, count) > 0) | with_face) & ~np.bool_(among_hair)
-    hair = (np.bincount(piece, moves, count) > 0) | among_hair
-    still = np.flatnonzero(~moves)
-    still = still[np.argsort(piece[still], kind="stable")]
-    found = []
-    for vertices in np.split(still, np.flatnonzero(np.diff(piece[still])) + 1) if len(still) else ():
-        number, riding = piece[vertices[0]], vertices[~outside[vertices]]
-        sizes = _size(mesh.points[vertices]), _size(mesh.points[riding])
-        found.append(_Part(vertices, *sizes, bool(skin[number]), bool(hair[number])))
+def _with_face(character: Character, meshes: list[SkinnedMesh], every: list[_Pieces]) -> list[np.ndarray]:
+    """For each mesh, the pieces (n,) that are the innermost in directions of the face."""
+    nearest, winner = np.full(len(TO_FACE), np.inf), np.full((len(TO_FACE), 2), -1)
+    for place, (mesh, own) in enumerate(zip(meshes, every)):
+        for ray, piece, far in zip(*_hits(character, mesh, own, TO_FACE)):
+            if far < nearest[ray]:
+                nearest[ray], winner[ray] = far, (place, piece)
+    found = [np.zeros(len(own.hairy), bool) for own in every]
+    for place, piece in {tuple(each) for each in winner.tolist() if each[0] >= 0}:
+        found[place][piece] = (winner == (place, piece)).all(axis=1).mean() > FACE
     return found
 
 
-def _with_face(character: Character, points: np.ndarray, triangles: np.ndarray, piece: np.ndarray) -> np.ndarray:
-    """Which pieces, of which each point has the number, lie with their triangles in the directions of the face."""
-    aside, down = np.radians(np.meshgrid(ASIDE, DOWN)).reshape(2, -1)
-    ways = np.stack([np.sin(aside) * np.cos(down), -np.sin(down), np.cos(aside) * np.cos(down)], axis=1)
-    ray, triangle = rays_through(character.canonical(points), triangles, character.head_centre, ways)
-    hit = np.zeros((len(ways), piece.max() + 1), bool)
-    hit[ray, piece[triangles[triangle, 0]]] = True
-    return hit.mean(axis=0) > FACE
+def _caps(character: Character, mesh: SkinnedMesh, own: _Pieces) -> np.ndarray:
+    """Pieces (n,) that cover the crown and are not as large as a hat."""
+    ray, piece, _ = _hits(character, mesh, own, TO_CROWN)
+    hit = np.zeros((len(TO_CROWN), len(own.hairy)), bool)
+    hit[ray, piece] = True
+    low, high = np.full((2, len(own.hairy), 3), np.inf)
+    np.minimum.at(low, own.number, mesh.points)
+    np.minimum.at(high, own.number, -mesh.points)
+    size = np.linalg.norm(-high - low, axis=1)
+    return (hit.mean(axis=0) > CROWN) & (size <= HAT * character.times_human)
 
 
-def _on_head(character: Character, mesh: SkinnedMesh) -> np.ndarray:
-    """Points of a mesh that ride on the head alone."""
-    return mesh.points[mesh.weight_on(~character.of_head) <= LEAST_WEIGHT]
-
-
-def _size(points: np.ndarray) -> float:
-    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+def _hits(character: Character, mesh: SkinnedMesh, own: _Pieces, ways: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Ray, piece and distance [m] wherever rays from the middle of the head meet what rides on it, (H,) each."""
+    ray, triangle, far = rays_through(character.canonical(mesh.points), own.riding, character.head_centre, ways)
+    return ray, own.number[own.riding[triangle, 0]], far
