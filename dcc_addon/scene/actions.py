@@ -164,7 +164,7 @@ def remove(armature) -> str:
     empty if there are none.
     """
     muted, settings = _take_off(armature), armature.neuralocks_character
-    rotations.give_back(armature, settings.keys_kept, keyed=True)
+    rotations.give_back(armature, settings.keys_kept, keyed=True, without=HAIR)
     alone.give_back(armature.animation_data, settings.keys_alone, HAIR)
     settings.keys_kept = settings.keys_alone = ""
     return muted
@@ -181,7 +181,7 @@ def _take_off(armature) -> str:
         else:
             armature.animation_data.nla_tracks.remove(track)
     for action in actions:
-        rotations.give_back(armature, action.get(KEPT, ""), keyed=not muted)
+        rotations.give_back(armature, action.get(KEPT, ""), keyed=True, without=HAIR)
         alone.give_back(armature.animation_data, action.get(ALONE, ""), HAIR)
         if not action.users:  # otherwise somebody keeps it
             bpy.data.actions.remove(action)
@@ -199,7 +199,7 @@ def without(armature):
             _unstar(track)
             track.mute = True
         for text in before:
-            rotations.give_back(armature, text)
+            rotations.give_back(armature, text, keyed=True, without=HAIR)
         yield
     finally:
         armature = identified(number)  # looked up again: there may have been an undo

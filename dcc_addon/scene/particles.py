@@ -16,7 +16,7 @@ from .animated import moved
 from .armature import matrix
 from .attach import check_own
 from .binding import at_rest
-from .shown import home_of
+from .shown import homes_of
 
 CHILD_STEPS = 4
 """A child gets at least two to this power segments."""
@@ -83,7 +83,8 @@ def convert(context, source, system, children: bool = True):
     thick, material = _radii(settings, counts, points), _material(source, settings)
     data = curves.create(f"{system.name} Hair", counts, points, thick, material)
     hair = bpy.data.objects.new(data.name, data)
-    home_of(source, context).objects.link(hair)
+    for home in homes_of(source, context):
+        home.objects.link(hair)
     hair.parent = source
     if hasattr(data, "surface") and source.type == "MESH":
         data.surface = source

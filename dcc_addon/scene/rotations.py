@@ -50,11 +50,11 @@ def joined(newer: str, older: str) -> str:
     return json.dumps(kept_in(newer) | kept_in(older))
 
 
-def give_back(armature, text: str, keyed: bool = False) -> None:
+def give_back(armature, text: str, keyed: bool = False, without=()) -> None:
     """Turn the bones that are still there as `kept` found them. With `keyed`, bones that animation has since begun to turn, as
-    Blender's Bake Action does, are left to it.
+    Blender's Bake Action does, are left to it, except that of NLA tracks of the names `without`.
     """
-    found, written = kept_in(text), animated(armature.animation_data) if keyed else set()
+    found, written = kept_in(text), animated(armature.animation_data, without) if keyed else set()
     for name, (mode, quaternion, euler, axis_angle, *more) in found.items():
         bone = _bone(armature, name, more, found) if armature.pose else None
         if bone is not None and (since := _written_since(bone, mode, more, written)):

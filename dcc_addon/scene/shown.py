@@ -25,13 +25,14 @@ def in_renders(thing, scene) -> bool:
     return drawn and _linked(thing, layers, "hide_render")
 
 
-def home_of(thing, context):
-    """The collection in which a new object appears wherever a thing does in this view layer: one of the thing's own; the scene's, if
-    none of them is shown, or all belong to other files.
+def homes_of(thing, context) -> list:
+    """The collections in which a new object appears wherever a thing does: the thing's own in this scene; also the scene's, if none of
+    them is in view, or all belong to other files.
     """
-    shown = list(_included(context.view_layer.layer_collection, "hide_viewport"))
-    own = (each for each in thing.users_collection if each in shown and not (each.library or each.override_library))
-    return next(own, context.scene.collection)
+    scene, layer = context.scene.collection, context.view_layer.layer_collection
+    here = {scene, *scene.children_recursive}
+    own = [each for each in thing.users_collection if each in here and not (each.library or each.override_library)]
+    return own if {*own} & {*_included(layer, "hide_viewport")} else [*own, scene]
 
 
 def _linked(thing, layers, off: str) -> bool:

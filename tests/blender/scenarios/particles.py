@@ -110,8 +110,8 @@ def cut_children(_folder: Path) -> None:
 
 
 def particles_where_they_show(folder: Path) -> None:
-    """Hair converted from particles is in a collection that shows it, whatever other collections its head is in; also on a head that is
-    overridden, while a linked one is refused and keeps its particles.
+    """Hair converted from particles is in the collections of its head, and shown if the head is; also on a head that is overridden,
+    while a linked one is refused and keeps its particles.
     """
     scene = bpy.context.scene
     kept, own = bpy.data.collections.new("A"), bpy.data.collections.new("B")
@@ -123,7 +123,7 @@ def particles_where_they_show(folder: Path) -> None:
     bpy.context.view_layer.layer_collection.children["A"].exclude = True
     bpy.context.view_layer.objects.active = ball
     assert bpy.ops.neuralocks.from_particles() == {"FINISHED"}
-    assert [each.name for each in scene.neuralocks.hair.users_collection] == ["B"]
+    assert [each.name for each in scene.neuralocks.hair.users_collection] == ["A", "B"]
 
     ball.modifiers[0].show_viewport = ball.modifiers[0].show_render = True
     bpy.data.objects.remove(scene.neuralocks.hair)
