@@ -15,12 +15,17 @@ from .scene.actions import has_keys
 from .scene.attach import has_cache, retimed_since
 from .scene.particles import waiting
 from .scene.paths import usual_output
+from .scene.sampled_from import begins_later, frames_of
 from .services.panel_errors import for_the_panel
 from .services.remaining import in_words
 from .services.sliders import SLIDERS
 from .session import session
 
 RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
+LATER = (
+    "it knows no motion before it. To render a part of a shot again, turn off Scene Range in the panel Bake, and name the "
+    "whole shot there"
+)
 _findings: dict[tuple, tuple[list, str]] = {}
 
 
@@ -84,6 +89,8 @@ def _motion(layout, armature, scene) -> None:
             words(
                 layout, f"Hair only knows the motion of frames {first:g} to {last:g}; widen the scene's range", "INFO"
             )
+    if not character.loop and begins_later(scene):
+        words(layout, f"Hair begins at rest at frame {frames_of(scene)[0]}: {LATER}", "INFO")
     if sampled is not None:
         for text in (*(() if character.loop else sampled.leaps), *sampled.bodies_off, *sampled.hairs_off.values()):
             words(layout, text, "INFO")

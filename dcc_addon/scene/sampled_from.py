@@ -28,6 +28,14 @@ def frames_of(scene) -> tuple[int, int]:
     return min(first for first, _ in ranges), max(last for _, last in ranges)
 
 
+def begins_later(scene) -> bool:
+    """Whether the frames to sample begin later than when the file was opened, as to render a part of a shot again: hair is then at rest
+    where they begin.
+    """
+    first, last = session.opened.get(scene.name_full, (0, -1))
+    return first < frames_of(scene)[0] <= last
+
+
 def timing_of(scene) -> tuple:
     """What a sampling depends on in the scene: frames, sub-frames, rate, unit."""
     return (

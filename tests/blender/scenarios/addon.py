@@ -9,7 +9,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 from tests.blender import scenes
-from tests.blender.checks import make_live, messages, own_handlers
+from tests.blender.checks import SAME, apart, make_live, messages, own_handlers, points_at
 from tests.blender.panel import drawn, preferences
 
 
@@ -78,6 +78,31 @@ def panel(folder: Path) -> None:
     for well, icon in ((True, "CHECKMARK"), (False, "ERROR")):
         session.trained = "Hair: said", well
         assert drawn(icon).count("Hair: said") == 2
+
+
+def a_part_again(folder: Path) -> None:
+    """In a window, the panel tells that hair begins at rest where a part of a shot does that was opened whole, and that a bake's range
+    lets it know the whole: then it is as it was.
+    """
+    from dcc_addon.scene import sampled_from
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    make_live(rig, scenes.hair(rig, 10))
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    rig, strands, scene = bpy.data.objects["Rig"], bpy.data.objects["Hair"], bpy.context.scene
+    rests = "Hair begins at rest at frame 12"
+    with patch.object(sampled_from, "bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
+        make_live(rig, strands)
+        whole = points_at(strands, 12)
+        assert rests not in " ".join(drawn())
+        scene.frame_start, scene.frame_end = 12, 14
+        make_live(rig, strands)
+        assert rests in " ".join(drawn()) and apart(points_at(strands, 12), whole) > 100 * SAME
+        scene.neuralocks.use_scene_range, scene.neuralocks.frame_start, scene.neuralocks.frame_end = False, 1, 24
+        make_live(rig, strands)
+        assert rests not in " ".join(drawn()) and apart(points_at(strands, 12), whole) < SAME
 
 
 def model_of_another_body(folder: Path) -> None:
