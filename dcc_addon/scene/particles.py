@@ -139,6 +139,9 @@ def _mesh_as_rendered(source, system_modifier, render):
     simple = {name: getattr(render, f"{name}_render") for name in ("simplify_subdivision", "simplify_child_particles")}
     with ExitStack() as changes:
         changes.enter_context(_changed(render, **simple))
+        for curve in source.animation_data.drivers if source.animation_data else ():
+            if curve.data_path.endswith(("].levels", "].show_viewport")):  # it would set them again
+                changes.enter_context(_changed(curve, mute=True))
         for modifier in list(source.modifiers)[: list(source.modifiers).index(system_modifier)]:
             finer = {"levels": modifier.render_levels} if modifier.type in ("SUBSURF", "MULTIRES") else {}
             changes.enter_context(_changed(modifier, show_viewport=modifier.show_render, **finer))

@@ -162,7 +162,13 @@ def particles_on_what_is_rendered(_folder: Path) -> None:
         assert bpy.ops.neuralocks.from_particles(system=ball.particle_systems[0].name) == {"FINISHED"}
         assert (subdivision.levels, puff.show_viewport) == (levels, drawn)
         found.append(np.array([p.position for p in bpy.context.scene.neuralocks.hair.data.points]))
-    assert apart(*found) < SAME
+    driver = subdivision.driver_add("levels").driver
+    driver.expression = "0 * frame"
+    bpy.context.scene.frame_set(2)
+    assert bpy.ops.neuralocks.from_particles(system=ball.particle_systems[0].name) == {"FINISHED"}
+    assert subdivision.levels == 0 and not ball.animation_data.drivers[0].mute
+    found.append(np.array([p.position for p in bpy.context.scene.neuralocks.hair.data.points]))
+    assert apart(found[0], found[1]) < SAME and apart(found[0], found[2]) < SAME
 
 
 def _ball(*modifiers: str):
