@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character
 from neuralocks_core.mesh import rays_through, welded_pieces
 from neuralocks_core.rig.hair_names import says_face
@@ -20,6 +21,10 @@ CROWN = 0.5
 """Share of the directions of the crown that a cap of hair covers: horns, ears and glasses are in fewer."""
 HAT = 0.5
 """Diagonal of the box around the largest cap, on a human [m]."""
+ABOVE, BEHIND = 30, 110
+"""Elevation above brows, and azimuth behind ears [degrees]: what reaches there on a head, or is there, is hair."""
+NEAR = 0.03
+"""The outermost points of fringes and cards are this near to skin, on a human [m]: horns reach away."""
 
 
 def _ways(*directions: tuple[tuple, tuple]) -> np.ndarray:
@@ -40,8 +45,8 @@ def parted(character: Character, meshes: list[SkinnedMesh], moving: np.ndarray) 
 
     The roots of locks, and the cap that they grow from, ride on the head as its skin does, and each may be in any mesh. So each
     connected piece of a mesh with locks is judged by itself: what goes on below the head is skin, and what is moved by joints of the
-    face, or is the innermost where the face is; else a piece that moves is hair, roots included, and so is a cap; eyes, ears and
-    horns are not. A mesh of hair alone is hair as a whole.
+    face, or is the innermost where the face is; else a piece that moves is hair, roots included, and so are caps, and fringes and
+    cards on the skull; eyes, ears and horns are not. A mesh of hair alone is hair as a whole.
 
     Args:
         character: skeleton and head.
@@ -54,15 +59,16 @@ def parted(character: Character, meshes: list[SkinnedMesh], moving: np.ndarray) 
     every = [_Pieces.of(character, mesh, moving) for mesh in meshes]
     if not any(own.moves.any() for own in every):
         return [(mesh.triangles, own.moves) for mesh, own in zip(meshes, every)]
-    result = []
-    for mesh, own, face in zip(meshes, every, _with_face(character, meshes, every)):
-        skin = own.goes_on | face
+    skins = [own.goes_on | face for own, face in zip(every, _with_face(character, meshes, every))]
+    surface, result = _surface(meshes, every, skins), []
+    for mesh, own, skin in zip(meshes, every, skins):
         if not own.hairy.any():
             body = ~own.moves
         elif own.moves.mean() > MOSTLY and not skin.any():
             body = np.zeros(len(mesh.points), bool)
         else:
-            body = (skin | own.of_face | ~(own.hairy | _caps(character, mesh, own)))[own.number] & ~own.moves
+            still = _caps(character, mesh, own) | _on_skull(character, mesh, own, surface)
+            body = (skin | own.of_face | ~(own.hairy | still))[own.number] & ~own.moves
         result.append((mesh.triangles[body[mesh.triangles].all(axis=1)], own.moves))
     return result
 
@@ -119,6 +125,31 @@ def _caps(character: Character, mesh: SkinnedMesh, own: _Pieces) -> np.ndarray:
     np.minimum.at(high, own.number, -mesh.points)
     size = np.linalg.norm(-high - low, axis=1)
     return (hit.mean(axis=0) > CROWN) & (size <= HAT * character.times_human)
+
+
+def _surface(meshes: list[SkinnedMesh], every: list[_Pieces], skins: list[np.ndarray]) -> Collider | None:
+    """The skin that rides on the head, in bind world; None if there is none."""
+    found = [
+        mesh.points[own.riding[skin[own.number[own.riding[:, 0]]]]] for mesh, own, skin in zip(meshes, every, skins)
+    ]
+    corners = np.concatenate(found)
+    return Collider(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)) if len(corners) else None
+
+
+def _on_skull(character: Character, mesh: SkinnedMesh, own: _Pieces, surface: Collider | None) -> np.ndarray:
+    """Pieces (n,) that lie on the head's skin from where only hair grows."""
+    count, near = len(own.hairy), NEAR * character.times_human
+    offset = character.canonical(mesh.points) - character.head_centre
+    x, y, z = offset.T
+    above, behind = np.degrees(np.arctan2(y, np.hypot(x, z))) > ABOVE, np.abs(np.degrees(np.arctan2(x, z))) > BEHIND
+    high, beside = (np.bincount(own.number, each, count) > 0 for each in (above, ~behind))
+    found = (high | ~beside) & ~own.hairy & ~own.goes_on
+    if surface is None or not found.any():
+        return found & False
+    order = np.lexsort((np.linalg.norm(offset, axis=1), own.number))
+    tips = order[np.flatnonzero(np.diff(own.number[order], append=-1))]  # of each piece
+    found[found] = np.abs(surface.distance(mesh.points[tips[found]], limit=near)[0]) < near
+    return found
 
 
 def _hits(character: Character, mesh: SkinnedMesh, own: _Pieces, ways: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -57,19 +57,20 @@ def _parts(dense: bool) -> dict:
         "horn": (HORN.vertices[:, [2, 0, 1]] + CENTRE + [0.08, 0.08, 0], HORN.faces, "head"),
         "bow": (0.2 * chest.vertices + CENTRE + [0, 0.1, -0.12], chest.faces, "ribbon"),
         "card": (_lock(TAILS[2])[0] + [0, 0.05, 0.001], _lock(TAILS[2])[1], "head"),
+        "fringe": (*_ball(0.105, CENTRE, lambda p: (p[:, 2] > 0.03) & (p[:, 1] > 0.035)), "head"),
         "cap": (*_ball(0.11, CENTRE, lambda p: p[:, 1] - p[:, 2] > 0.02), "head"),
         **{name: _lock(name) for name in TAILS},
     }
     return {k: (p, f, [j] * len(p) if isinstance(j, str) else j) for k, (p, f, j) in parts.items()}
 
 
-HAIR = ["cap", *TAILS]
+HAIR = ["cap", "fringe", *TAILS]
 MOVING = np.array([leaf.startswith("hair") for leaf in LEAVES])
 DIVIDED = {
     "hair apart": [["torso", "head", "eye", "horn"], HAIR],
     "head apart": [["torso"], ["head", "eye", "horn"], HAIR],
     "head with hair": [["torso"], ["head", "eye", "horn", *HAIR]],
-    "cap with body": [["torso", "cap", *TAILS[:1]], ["head", "eye", "horn", *TAILS[1:]]],
+    "cap with body": [["torso", "cap", "fringe", *TAILS[:1]], ["head", "eye", "horn", *TAILS[1:]]],
     "one mesh": [["torso", "eye", "horn", *HAIR, "head"]],
 }
 
@@ -122,7 +123,7 @@ def test_weights_that_bleed_decide_nothing():
 
 def test_hair_without_a_character_is_hair():
     """Of a cap with locks alone, nothing is body."""
-    mesh, owner = _mesh(_parts(False), HAIR)
+    mesh, owner = _mesh(_parts(False), ["cap", *TAILS])
     assert (owner != "cap").mean() > 0.2
     ((triangles, moved),) = parted(WHO, [mesh], MOVING)
     assert moved.any() and not len(triangles)
