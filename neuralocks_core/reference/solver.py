@@ -29,6 +29,10 @@ SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 """[s] growing steps of a gradient flow that finds the equilibrium before the first frame."""
 
 
+CROWDED, AT_REST = 30, 1e-4
+"""With a volume term, most such searches, until one moves no vertex by more than this [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class SimulatedHair:
     """T frames of S simulated strands, in canonical space, so without the head's own motion."""
@@ -138,7 +142,7 @@ def simulate(
         stepper.attach_body(np.asarray(bind_body), faces)
         stepper.move_body(first)
     stepper.blow(wind[0])
-    _begin(stepper, way, rods, start, iterations)
+    _begin(stepper, way, rods, start, iterations, volume > 0)
     for frame in range(frames):
         steps = [] if frame == 0 else range((frame - 1) * substeps + 1, frame * substeps + 1)
         for step in steps:
@@ -160,10 +164,14 @@ def _empty_rollout(frames: int, strands: int, vertices: int, planes: bool) -> Si
     return SimulatedHair(points, near, np.zeros(frames), np.zeros(frames))
 
 
-def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, iterations: int) -> None:
+def _begin(stepper, way: HeadMotion, rods: RestRods, start: np.ndarray | None, iterations: int, crowded: bool) -> None:
     """Put hair at its start, by default in the equilibrium of the first pose, moving along with the head."""
     stepper.begin(way.turn[0], way.origin[0], rods.points if start is None else start)
     if start is None:
-        stepper.settle(SETTLE_DT, iterations)
+        for _ in range(CROWDED if crowded else 1):  # strands that push each other apart move a little at a time
+            begun = stepper.x.numpy().copy()
+            stepper.settle(SETTLE_DT, iterations)
+            if np.abs(stepper.x.numpy() - begun).max(initial=0.0) < AT_REST:
+                break
     before = way.origin[0] - (way.origin[1] - way.origin[0]) if len(way.origin) > 1 else way.origin[0]
     stepper.start_moving(before)

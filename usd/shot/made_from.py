@@ -35,16 +35,26 @@ def unlike(one: dict, other: dict) -> list[str]:
 def baked_from_others(prim: Usd.Prim, found: Attachment, groom: Groom) -> list[str]:
     """The notes on a bake over another groom or animation than the one it was made from.
 
-    If time codes are shifted or stretched between the bake and the stage, units differ, or another joint is taken as the head, they
-    cannot be compared.
+    If time codes are shifted or stretched between the bake and the stage, units differ, or other joints are taken as the head or its
+    body's, they cannot be compared.
     """
     told, border = recorded(prim), found.rig.border
     if INPUTS not in told or not seen_as_written(prim, border) or recorded_joint(prim) != rig_joint(found):
+        return []
+    if not _mapped_as(told.get("joints"), found):
         return []
     return [
         f"{prim.GetPath()}: the shot's {name} is not the one that this was baked from; bake again"
         for name in unlike(told, {INPUTS: made_from(found, groom)})
     ]
+
+
+def _mapped_as(given, found: Attachment) -> bool:
+    """Whether the joints that the user gave for a bake are those of the character now."""
+    humanoid, names = found.character.humanoid, found.character.skeleton.names
+    now = {meaning: names[joint] for meaning, joint in humanoid.items()}
+    joints = given if isinstance(given, dict) else {}
+    return all(now.get(meaning, "").split("/")[-1] == str(joint).split("/")[-1] for meaning, joint in joints.items())
 
 
 def _same(one: str, other: str, near: float) -> bool:
