@@ -136,10 +136,9 @@ def has_keys(armature) -> bool:
         return True
     data = armature.animation_data
     strips = [strip for track in data.nla_tracks for strip in track.strips] if data else []
-    elsewhere = any(
-        strip.action and KEPT in strip.action for strip in strips
-    )  # the artist renamed the track, and has it
-    return bool(armature.neuralocks_character.keys_kept) and not elsewhere
+    # If the artist renamed the track, it plays on, and is the artist's.
+    playing = any(strip.action and KEPT in strip.action for strip in strips)
+    return bool(armature.neuralocks_character.keys_kept) and not playing
 
 
 def beside_others(armature) -> bool:
