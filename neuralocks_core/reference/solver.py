@@ -77,8 +77,9 @@ def simulate(
     Responsive Cloth"; docs/architecture.md, Reference).
 
     Before the first frame the head moves at constant velocity without rotating and the hair is at rest relative to it. Any
-    motion is stable: lengths are exact by construction and every step lowers an energy. The time step's error is of second order,
-    so that it damps motion by next to nothing, unlike implicit Euler's.
+    motion is stable: lengths are exact by construction and every step lowers an energy. The time step's error is of second order
+    if hair starts in equilibrium, so that it damps motion by next to nothing, unlike implicit Euler's. A volume term makes steps less
+    exact, which the residual does not show: take several substeps, and compare.
 
     Args:
         rest: (S, K, 3) canonical rest points [m]; vertices 0 and 1 are clamped to the head.

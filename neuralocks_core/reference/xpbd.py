@@ -42,8 +42,8 @@ def simulate_xpbd(
     Args:
         rest, head, body, triangles, material, dt, rest_support, bind_body, margin, gravity, wind, device, progress: as
             in `solver.simulate`.
-        substeps: per frame; the wind is the same in all of them. Beyond about 300, errors grow again: single precision rounds away
-            what gravity does in so short a step.
+        substeps: per frame; the wind is the same in all of them. Beyond a few hundred, errors grow again: single precision rounds
+            away what gravity does in so short a step.
 
     Returns:
         As `solver.simulate`; residual is NaN (nothing is solved for), iterations are the substeps.
