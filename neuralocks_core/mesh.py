@@ -8,7 +8,6 @@ from neuralocks_core.rotation import unit
 INSIDE_OUT = -0.3
 """Volumes that triangles span with the middle of the mesh: their sum over the sum of their sizes. 1 for a ball, 0.5 for a person
 with arms spread, near 0 for hair cards and cloth, whose sides mean nothing. Below this value the mesh is inside out."""
-
 WELDED = 1e-4
 """Points this close [m] count as one: files split a skin along texture seams and between meshes."""
 

@@ -73,7 +73,8 @@ def owner_of(out: Path, character: str) -> str:
     if not shot.is_file():
         return ""
     other, player = character_of(shot), player_of(shot)
-    own = any(thing.neuralocks_hair.armature == find(character) for thing in attach.players(str(out)))  # renamed since
+    armature = find(character)
+    own = any(thing.neuralocks_hair.armature == armature for thing in attach.players(str(out)))  # renamed since
     there = os.path.isfile(os.path.normpath(shot.parent / player))  # as it was written, whatever folder is a link
     if player and player != beside(shot) and (there or not own):  # it may have been moved
         return f"{player}, which plays it"
@@ -222,7 +223,7 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
 
         def taken(out: Path) -> bool:  # the panel's output is the same for all hair
             players = (thing.name_full for thing in attach.players(str(out)))
-            return any(other != name for other in players) or bool(owner_of(out, character))
+            return any(other != name for other in players) or owner_of(out, character) != ""
 
         path = untaken(path, label, taken)
         baked, notes, _ = yield from bake_steps(context, named(character), [named(name)], str(path), attached=True)

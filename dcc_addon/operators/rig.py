@@ -124,7 +124,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
         from usd.assets.own_layers import is_own
         from usd.rig.bake import bake_rig
 
-        out = untaken(out, label, lambda path: bool(owner_of(path, name)))
+        out = untaken(out, label, lambda path: owner_of(path, name))
         shot = shot_beside(out)
         check_ours([out, shot], is_own)
         sampled = yield from sampling(context, named(name), share=0.5)

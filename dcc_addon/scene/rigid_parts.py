@@ -5,7 +5,7 @@ its body.
 
 import numpy as np
 
-from neuralocks_core.rotation import flat, transformed
+from neuralocks_core.rotation import flat, inverse, transformed
 
 from . import curves
 from .binding import carrying_bone
@@ -46,7 +46,7 @@ def _under(mesh, place: np.ndarray, roots: np.ndarray) -> bool:
     """Whether most roots lie in the box of a mesh."""
     if flat(place[:3, :3]) or not len(roots):
         return False
-    points, own = vertices(mesh), transformed(roots, np.linalg.inv(place))
+    points, own = vertices(mesh), transformed(roots, inverse(place))
     low, high = points.min(axis=0), points.max(axis=0)
     margin = MARGIN * np.linalg.norm(high - low)
     return ((own >= low - margin) & (own <= high + margin)).all(axis=1).mean() >= UNDER

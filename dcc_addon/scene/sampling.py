@@ -82,8 +82,9 @@ class _Recording:
         for joint in reversed(range(len(self._rig.bones))):  # parents come first
             if joint in self._needed:
                 self._needed.add(self._rig.parents[joint])
-        self._bodies = [body.name_full for body in bodies_of(armature, self._scene)]
-        self._rigid = [o.name_full for o in rigid_parts.find(armature, bodies_of(armature, self._scene), self._scene)]
+        bodies = bodies_of(armature, self._scene)
+        self._bodies = [body.name_full for body in bodies]
+        self._rigid = [part.name_full for part in rigid_parts.find(armature, bodies, self._scene)]
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
         self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
         self._posture, self._moved_by = posture_of(armature, self._scene), moved_by(armature, self._scene)

@@ -27,8 +27,6 @@ INTEGRATOR = "BDF2"
 """How the solver steps in time: what was simulated in another way has other motion."""
 SETTLE_DT = tuple(1 / 30 * 1.5**i for i in range(14))
 """[s] growing steps of a gradient flow that finds the equilibrium before the first frame."""
-
-
 CROWDED, AT_REST = 30, 1e-4
 """With a volume term, most such searches, until one moves no vertex by more than this [m]."""
 

@@ -57,8 +57,6 @@ def parted(character: Character, meshes: list[SkinnedMesh], moving: np.ndarray) 
         for each mesh, triangles (F', 3) of the body and a mask (V,) of hair.
     """
     every = [_Pieces.of(character, mesh, moving) for mesh in meshes]
-    if not any(own.moves.any() for own in every):
-        return [(mesh.triangles, own.moves) for mesh, own in zip(meshes, every)]
     skins = [own.goes_on | face for own, face in zip(every, _with_face(character, meshes, every))]
     surface, result = _surface(meshes, every, skins), []
     for mesh, own, skin in zip(meshes, every, skins):
@@ -132,7 +130,7 @@ def _surface(meshes: list[SkinnedMesh], every: list[_Pieces], skins: list[np.nda
     found = [
         mesh.points[own.riding[skin[own.number[own.riding[:, 0]]]]] for mesh, own, skin in zip(meshes, every, skins)
     ]
-    corners = np.concatenate(found)
+    corners = np.concatenate([np.zeros((0, 3, 3)), *found])
     return Collider(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)) if len(corners) else None
 
 
@@ -145,7 +143,7 @@ def _on_skull(character: Character, mesh: SkinnedMesh, own: _Pieces, surface: Co
     high, beside = (np.bincount(own.number, each, count) > 0 for each in (above, ~behind))
     found = (high | ~beside) & ~own.hairy & ~own.goes_on
     if surface is None or not found.any():
-        return found & False
+        return np.zeros(count, bool)
     order = np.lexsort((np.linalg.norm(offset, axis=1), own.number))
     tips = order[np.flatnonzero(np.diff(own.number[order], append=-1))]  # of each piece
     found[found] = np.abs(surface.distance(mesh.points[tips[found]], limit=near)[0]) < near

@@ -17,7 +17,7 @@ from neuralocks_core.progress import Progress, silent
 from ..border.damage import first_line, named
 from ..border.stage_files import LAYERS, check_file, check_layer_name, check_not_over, one_file, open_stage
 from ..border.units import Border
-from ..shot.gaps import gaps, thinned
+from ..shot.gaps import gaps, some, thinned
 from ..shot.made_from import INPUTS, unlike
 from ..shot.notes import composition_notes, few, out_of_place
 from ..shot.recorded import KEY
@@ -290,5 +290,5 @@ def _all_gaps(plan: dict[Sdf.Path, dict[float, _Part]], frame: float, stage: Usd
 
 def _gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
     """The notes on frames of the shot that no part has."""
-    found = gaps(codes, frame, stage)
-    return [f"no part has samples {', '.join(found[:4])}{', ...' if len(found) > 4 else ''}"] if found else []
+    where = some(gaps(codes, frame, stage))
+    return [f"no part has samples {where}"] if where else []

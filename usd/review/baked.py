@@ -12,7 +12,7 @@ from neuralocks_core.preview.film import Scene
 from neuralocks_core.rotation import transformed
 
 from ..border.values import as_numbers
-from ..shot.gaps import gaps
+from ..shot.gaps import gaps, some
 from ..shot.made_from import baked_from_others
 from ..shot.recorded import recorded_cuts, recorded_joint, retimed
 from ..shot.stage import Shot, StageGroom, read_shot
@@ -144,11 +144,12 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
 
 def _broken(path: str, codes: list[float], shot: Shot) -> list[str]:
     """The note on frames that a groom lacks between others; a bake of a part of the shot is whole."""
-    found = [where for where in gaps(codes, shot.border.frame, shot.stage) if where.startswith("between")]
-    if not found:
-        return []
-    where = f"{', '.join(found[:4])}{', ...' if found[4:] else ''}"
-    return [f"{path}: has no samples {where}, where hair moves along straight lines; bake these frames, too"]
+    where = some(gaps(codes, shot.border.frame))
+    return (
+        [f"{path}: has no samples {where}, where hair moves along straight lines; bake these frames, too"]
+        if where
+        else []
+    )
 
 
 def _named_head(shot: Shot) -> str | None:

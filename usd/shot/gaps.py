@@ -7,15 +7,15 @@ from pxr import Usd, UsdGeom
 from .recorded import recorded
 
 
-def gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
+def gaps(codes: list[float], frame: float, stage: Usd.Stage | None = None) -> list[str]:
     """Where samples are missing, in words such as "between 5 and 9"; regular steps of several frames are not gaps.
 
     Args:
         codes: time codes of a groom's samples, ascending.
         frame: time codes between two frames.
-        stage: the shot, whose ends count if it names them.
+        stage: the shot, whose ends count if it names them; None for a part of it, which has ends of its own.
     """
-    named = stage.HasAuthoredTimeCodeRange()
+    named = stage is not None and stage.HasAuthoredTimeCodeRange()
     first, last = (stage.GetStartTimeCode(), stage.GetEndTimeCode()) if named else (codes[0], codes[-1])
     frames = np.unique(np.floor((np.array(codes) - codes[0]) / frame + 1e-6)) * frame + codes[0]
     steps = np.diff(frames)
@@ -24,6 +24,11 @@ def gaps(codes: list[float], frame: float, stage: Usd.Stage) -> list[str]:
     missed = usual * (1 - 1e-6)  # a shot may begin and end off a frame; less than a step is not a gap
     found = ([f"before {codes[0]:g}"] if codes[0] - first >= missed else []) + found
     return found + ([f"after {codes[-1]:g}"] if last - frames[-1] >= missed else [])
+
+
+def some(missing: list[str]) -> str:
+    """The first few places of `gaps`, for a note; empty if there are none."""
+    return ", ".join(missing[:4]) + (", ..." if missing[4:] else "")
 
 
 def thinned(codes: list[float], frame: float) -> list[str]:

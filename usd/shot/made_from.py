@@ -3,6 +3,7 @@
 
 from pxr import Usd
 
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.groom import Groom
 from neuralocks_core.sketch import alike, sketch
 
@@ -52,9 +53,9 @@ def baked_from_others(prim: Usd.Prim, found: Attachment, groom: Groom) -> list[s
 def _mapped_as(given, found: Attachment) -> bool:
     """Whether the joints that the user gave for a bake are those of the character now."""
     humanoid, names = found.character.humanoid, found.character.skeleton.names
-    now = {meaning: names[joint] for meaning, joint in humanoid.items()}
+    now = {meaning: leaf(names[joint]) for meaning, joint in humanoid.items()}
     joints = given if isinstance(given, dict) else {}
-    return all(now.get(meaning, "").split("/")[-1] == str(joint).split("/")[-1] for meaning, joint in joints.items())
+    return all(now.get(meaning) == leaf(str(joint)) for meaning, joint in joints.items())
 
 
 def _same(one: str, other: str, near: float) -> bool:

@@ -129,6 +129,10 @@ def test_hair_without_a_character_is_hair():
     assert moved.any() and not len(triangles)
 
 
+def test_without_meshes_nothing_is_parted():
+    assert parted(WHO, [], MOVING) == []
+
+
 def test_rays_pass_through_what_lies_ahead():
     points = np.array([[-1, -1, 2], [1, -1, 2], [0, 1, 2], [0, 0, -3], [1, 0, -3], [0, 1, -3.0]])
     ways = np.array([[0, 0, 1.0], [0, 0, -1], [0.2, 0.2, -3], [1, 0, 0]])
