@@ -15,7 +15,7 @@ from neuralocks_core.rig.rigging import assemble_rig
 from ..border.damage import names_damage
 from ..border.stage_files import OTHERS, USD, open_stage
 from ..border.units import Border
-from ..rig.facing import facing_notes
+from ..rig.facing import askew_notes
 from ..rig.notes import RIG_JOINTS, mirrored_notes, weight_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import check_orients, core_meshes, describe_chains, is_baked
@@ -157,7 +157,7 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
         reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
         spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
-    spoils += weight_notes(rig) + facing_notes(rig) + outside_notes(rig) + mirrored_notes(rig, chains)
+    spoils += weight_notes(rig) + askew_notes(rig) + outside_notes(rig) + mirrored_notes(rig, chains)
     spoils += left_out_notes(rig, meshes, chains)
     return [
         {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)

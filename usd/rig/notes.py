@@ -12,7 +12,7 @@ from ..shot.character_notes import lies_down
 from ..shot.notes import another_head, unfound, unlikely_head
 from ..skel.binding import rest_primvar
 from ..skel.stage_rig import StageRig
-from .facing import facing_notes
+from .facing import askew_notes
 from .outside import left_out_notes, outside_notes
 from .stage import RiggedHair, core_meshes
 
@@ -29,7 +29,7 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
     """
     found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source), *lies_down(source)]
     frames = source.border.frame_notes(source.path)
-    return [*source.notes, *frames, *weight_notes(source), *facing_notes(source), *outside_notes(source), *found]
+    return [*source.notes, *frames, *weight_notes(source), *askew_notes(source), *outside_notes(source), *found]
 
 
 def chain_notes(hair: RiggedHair, patterns: list[str] | None) -> list[str]:

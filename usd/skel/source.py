@@ -19,6 +19,7 @@ from .bind_world import to_bind_world
 from .blend_shapes import all_shares, knot_weights
 from .clip_codes import clip_codes
 from .cut_samples import cut_samples
+from .facing import backwards_notes
 from .joints import JointSource
 from .old_copy import copy_notes, is_outdated
 from .stage_rig import StageRig, joint_trim
@@ -81,6 +82,7 @@ def read_rig(
     knots = {name: own for (name, own), kept in zip(knots.items(), used, strict=True) if kept}
     body = merged_body(meshes, to_bind, set(knots))
     character = Character(skeleton, body, humanoid)
+    notes += backwards_notes(source, character)
     clip = Clip(
         border.seconds(time_codes),
         border.to_core @ posed @ trim,
