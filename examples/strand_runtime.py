@@ -39,10 +39,9 @@ class Runtime:
         bend, weight, damping, clumping = (material[name] / DEFAULT[name] for name in DEFAULT)
         self.pace = np.sqrt(weight)
         self.fixed["held"][slice(*self.parts["material"])] = [np.log(bend / weight), 0, np.log(damping / self.pace), 0]
-        for locks in ("", "lock_"):
-            self.fixed[f"{locks}anchor"][:] = 0
-            if self.model.get("anchored"):
-                self.fixed[f"{locks}anchor"] = self.answer("offsets", self.made(self.fixed["held"]), locks)
+        self.fixed["anchor"][:] = 0
+        if self.model.get("anchored"):
+            self.fixed["anchor"] = self.answer("offsets", self.made(self.fixed["held"]))
         length = np.maximum(self.fixed["length"], 1e-3)
         own = 12.36 * material["bend"] / length**4 + 9.81 * material["weight"] / length
         tie = self.fixed["tie"]
@@ -86,17 +85,24 @@ class Runtime:
         """Outputs of frame.onnx for a boundary vector."""
         return {o.name: v for o, v in zip(self.frame.get_outputs(), self.frame.run(None, {"frame": vector[None]}))}
 
-    def answer(self, output: str, frame: dict[str, np.ndarray], locks: str = "") -> np.ndarray:
-        """An output of tail.onnx for the strands, or with "lock_" for the mean strands of their locks."""
-        same = {name: self.fixed[locks + name] for name in ("strand_part", "anchor", "edges")}
+    def answer(self, output: str, frame: dict[str, np.ndarray]) -> np.ndarray:
+        """An output of tail.onnx for the strands."""
+        same = {name: self.fixed[name] for name in ("strand_part", "anchor", "edges")}
         return self.tail.run([output], same | frame)[0]
+
+    def lock_means(self, moved: np.ndarray) -> np.ndarray:
+        """The mean (S, 24, 3) of what the strands of each strand's lock do, of which `moved` (S, 24, 3) is each one's own."""
+        lock, valid = self.fixed["lock"], self.fixed["valid"]
+        total = np.zeros((lock.max() + 1, *moved.shape[1:]))
+        np.add.at(total, lock[valid], moved[valid])
+        return (total / np.bincount(lock[valid], minlength=len(total)).clip(1)[:, None, None])[lock]
 
     def strands(self, vector: np.ndarray, head: np.ndarray) -> np.ndarray:
         """World points (S, 24, 3) [m] for a boundary vector and the head joint's world transform (4, 4) in the stage."""
         frame = self.made(vector)
         moved = self.answer("displacement", frame).reshape(-1, 24, 3)
         if (self.stray != 1).any():
-            led = self.answer("displacement", frame, "lock_").reshape(-1, 24, 3)[self.fixed["lock"]]
+            led = self.lock_means(moved)
             edges = np.diff(self.fixed["rest"], axis=1)
             wanted = edges + np.diff(led + self.stray * (moved - led), axis=1)
             own, size = (np.linalg.norm(e, axis=2, keepdims=True) for e in (edges + np.diff(moved, axis=1), wanted))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from neuralocks_core.materials import Material, constants
 from neuralocks_core.motion import GRAVITY
 from neuralocks_core.network_sizes import SHAPE, K
 from neuralocks_core.strands.locks import lock_mates, lock_means, tied_together
-from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, root_frames
+from neuralocks_core.strands.strand_set import CLAMPED, StrandSet
 
 CANTILEVER = 12.36
 """Fourth power of 1.8751, the first root of a clamped rod's cos cosh = -1."""
@@ -19,19 +20,19 @@ CANTILEVER = 12.36
 
 @dataclass(frozen=True, eq=False)
 class Locks:
-    """The parts of a groom's locks that ties join, each as a strand of its own, and how their motion moves their hairs.
+    """The parts of a groom's locks that ties join, and how far their hairs stray from the motion that they share.
 
     The network knows what a hair and its lock look like, but not where its neighbours are, so it learns nothing about ties
-    between them. Therefore it also computes the locks' own strands in each frame, and hairs are drawn towards their lock's
-    motion, or released from it. At the default, nothing is computed.
+    between them. Therefore hairs are drawn towards the mean motion of their lock, or released from it, afterwards. Ties pull
+    hairs towards each other, so they do not move a lock as a whole. At the default, nothing is computed.
     """
 
-    strands: StrandSet
-    """A strand for each lock: the mean of its hairs. Hairs of a lock that no tie joins are locks of their own."""
     rest: np.ndarray
     """The hairs' (S, 24, 3) rest points [m]."""
+    valid: np.ndarray
+    """(S,) bool, hairs that count."""
     lock: np.ndarray
-    """(S,) each hair's lock."""
+    """(S,) each hair's lock. Hairs that no tie joins to others are locks of their own."""
     rod: np.ndarray
     """(S,) how firmly bending stiffness holds each hair, as a clamped rod: 12.36 / L^4 [1/m^4]."""
     pendulum: np.ndarray
@@ -41,28 +42,19 @@ class Locks:
 
     @classmethod
     def of(cls, strands: StrandSet) -> Locks:
-        """The locks of a groom; invalid strands do not count."""
-        count = len(strands.rest)
-        flat = np.concatenate([strands.rest.reshape(count, -1), strands.uv, strands.root_normal], axis=1)
+        """The locks of a groom."""
         mates = lock_mates(strands.rest, strands.lock)
         own = tied_together(mates)
-        means = lock_means(flat, own, strands.valid)
-        rest, uv, normal = means[:, :SHAPE].reshape(-1, K, 3), means[:, SHAPE:-3], means[:, -3:]
-        normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-        lock = StrandSet(
-            rest=rest,
-            valid=np.ones(len(means), bool),
-            uv=uv,
-            root_frame=root_frames(normal).astype(np.float32),
-            lock=np.arange(len(means), dtype=np.int32),
-            length=np.linalg.norm(np.diff(rest, axis=1), axis=2).sum(axis=1),
-            head_origin=strands.head_origin,
-            head_centre=strands.head_centre,
-            facing=strands.facing,
-        )
+        means = lock_means(strands.rest.reshape(len(own), -1), own, strands.valid).reshape(-1, K, 3)
         length = np.maximum(strands.length.astype(np.float64), 1e-3)
-        tie = _tie(strands.rest, mates, own, rest)
-        return cls(lock, strands.rest, own, CANTILEVER / np.square(np.square(length)), -GRAVITY[1] / length, tie)
+        return cls(
+            strands.rest,
+            strands.valid,
+            own,
+            CANTILEVER / np.square(np.square(length)),
+            -GRAVITY[1] / length,
+            _tie(strands.rest, mates, own, means),
+        )
 
     def spread(self, log_ratios: np.ndarray) -> np.ndarray:
         """Factors on how far hairs stray from their lock: 1 for the default clumping, less for more clumping.
@@ -82,26 +74,33 @@ class Locks:
         own = weight * (bend * self.rod + self.pendulum)  # the vector's bend is B / w
         return ((own + 2 * self.tie * Material().clumping) / (own + 2 * self.tie * clumping)).astype(np.float32)
 
-    def gather(self, displacement: np.ndarray, hairs: slice, led: np.ndarray, factor: np.ndarray) -> None:
+    def gather(self, displacement: np.ndarray, log_ratios: np.ndarray) -> Callable[[slice], np.ndarray]:
         """Change how far hairs stray from their locks. Each edge keeps the length that the network gave it: its rest length, unless
         the model outputs displacements, which may stretch hair.
 
         Args:
-            displacement: of these hairs (n, 72) float32 [m], changed in place.
-            hairs: which.
-            led: displacement of all locks (L, 24, 3) [m].
-            factor: of all hairs (S,) float32, on the distance between a hair's displacement and its lock's (`spread`).
+            displacement: of all hairs (S, 72) float32 [m].
+            log_ratios: of the material (4,), as a boundary vector holds it.
+
+        Returns:
+            A function from some hairs to their changed displacement (n, 72) float32 [m].
         """
-        rest = self.rest[hairs]
-        moved = displacement.reshape(rest.shape)
-        way = led[self.lock[hairs]]
-        edges = np.diff(rest, axis=1)
-        own = edges + np.diff(moved, axis=1)
-        wanted = edges + np.diff(way + factor[hairs, None, None] * (moved - way), axis=1)
-        length, size = (np.sqrt(np.square(each).sum(-1, keepdims=True)) for each in (own, wanted))
-        change = (wanted * (length / np.maximum(size, 1e-12)) - edges)[:, CLAMPED - 1 :]
-        moved[:, :CLAMPED] = 0
-        np.cumsum(change, axis=1, out=moved[:, CLAMPED:])
+        led = lock_means(displacement, self.lock, self.valid).reshape(-1, K, 3)
+        factor = self.spread(log_ratios)
+
+        def gathered(hairs: slice) -> np.ndarray:
+            moved = displacement[hairs].reshape(-1, K, 3)
+            way = led[self.lock[hairs]]
+            edges = np.diff(self.rest[hairs], axis=1)
+            own = edges + np.diff(moved, axis=1)
+            wanted = edges + np.diff(way + factor[hairs, None, None] * (moved - way), axis=1)
+            length, size = (np.sqrt(np.square(each).sum(-1, keepdims=True)) for each in (own, wanted))
+            change = (wanted * (length / np.maximum(size, 1e-12)) - edges)[:, CLAMPED - 1 :]
+            result = np.zeros_like(moved)
+            np.cumsum(change, axis=1, out=result[:, CLAMPED:])
+            return result.reshape(-1, SHAPE)
+
+        return gathered
 
 
 def _tie(rest: np.ndarray, mates: np.ndarray, lock: np.ndarray, means: np.ndarray) -> np.ndarray:

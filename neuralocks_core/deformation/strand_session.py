@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from threading import Lock
 
 import numpy as np
 
@@ -37,8 +36,6 @@ class StrandSession:
         self.strand_part = self._by_chunk(lambda s: model.run("strand.onnx", "strand_part", strand=inputs[s]), HIDDEN)
         self.anchor_offsets = np.zeros((count, SHAPE), np.float32)
         self._anchored_at: np.ndarray | None = None
-        # Many small steps of Python are slower in two threads than in one, but not alongside a network.
-        self._turn = Lock()
 
     def anchor(self, vector: np.ndarray) -> None:
         """Measure an anchored model's outputs from this boundary vector: the held bind pose with the materials in use.
@@ -59,26 +56,20 @@ class StrandSession:
         Raises:
             NeuralocksError: the vector has the wrong shape, or is not one of finite numbers.
         """
-        frame, gather = self._frame(vector)
-        result = self._tail("displacement", frame, gather)
+        result = self._by_chunk(self._displaced(vector), SHAPE)
         still = ~self.strands.valid
         if still.any():
             result[still] = 0
         return result.reshape(len(result), K, 3)
 
-    def _frame(self, vector: np.ndarray):
-        """What all strands share in a frame: the tail's inputs, and how to change a chunk's displacement afterwards."""
+    def _displaced(self, vector: np.ndarray) -> Callable[[slice], np.ndarray]:
+        """What gives a chunk's displacement (n, 72) in a frame. What strands share is computed here, once."""
         vector = self.model.vector(vector)
         frame = self.model.frame(self._read(vector))
         material = vector[self.model.spec.slices["material"]]
         if not material[CLUMPING]:  # exactly 0 for the default
-            return frame, None
-        locks, session = self._locks
-        if self._anchored_at is not None:
-            session.anchor(self._anchored_at)
-        led = session._tail("displacement", frame).reshape(-1, K, 3)
-        factor = locks.spread(material)
-        return frame, partial(locks.gather, led=led, factor=factor)
+            return partial(self._chunk, "displacement", frame)
+        return self._locks.gather(self._tail("displacement", frame), material)
 
     def _read(self, vector: np.ndarray) -> np.ndarray:
         """What the network is given of a vector."""
@@ -87,40 +78,28 @@ class StrandSession:
         return read
 
     @cached_property
-    def _locks(self) -> tuple[Locks, StrandSession]:
-        locks = Locks.of(self.strands)
-        return locks, StrandSession(self.model, locks.strands)
+    def _locks(self) -> Locks:
+        return Locks.of(self.strands)
 
-    def _tail(self, output: str, frame: dict[str, np.ndarray], gather: Callable | None = None) -> np.ndarray:
+    def _tail(self, output: str, frame: dict[str, np.ndarray]) -> np.ndarray:
         """Output (S, 72) for all strands."""
-
-        def values(chunk: slice) -> np.ndarray:
-            found = self._chunk(output, chunk, frame)
-            if gather is not None:
-                with self._turn:
-                    gather(found, chunk)
-            return found
-
-        return self._by_chunk(values, SHAPE)
+        return self._by_chunk(partial(self._chunk, output, frame), SHAPE)
 
     def each(self, vector: np.ndarray, function: Callable[[slice, np.ndarray], None]) -> None:
         """Call `function(strands, displacement (n, 24, 3))` for every chunk of strands, in the thread that has just computed the chunk
         and still has it in its cache: several of them call it at a time.
         """
-        (frame, gather), valid = self._frame(vector), self.strands.valid
+        displaced, valid = self._displaced(vector), self.strands.valid
 
         def work(chunk: slice) -> None:
-            values = self._chunk("displacement", chunk, frame)
-            if gather is not None:
-                with self._turn:
-                    gather(values, chunk)
+            values = displaced(chunk)
             if not valid[chunk].all():
                 values[~valid[chunk]] = 0
             function(chunk, values.reshape(-1, K, 3))
 
         self.model.by_chunk(work, len(self.strands.rest))
 
-    def _chunk(self, output: str, chunk: slice, frame: dict[str, np.ndarray]) -> np.ndarray:
+    def _chunk(self, output: str, frame: dict[str, np.ndarray], chunk: slice) -> np.ndarray:
         """Output (n, 72) for one whole chunk."""
         return self.model.run(
             "tail.onnx",

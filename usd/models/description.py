@@ -127,9 +127,8 @@ SLIDERS = {
     "motion strength": "a factor of `history`: 0 is each pose as if held, 1 as trained",
     "wind": _WIND,
     "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
-    f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. With the same frame, tail.onnx gives D, the displacement of each strand, and L, "
-    "that of its lock's mean strand (`lock_strand_part`, `lock_anchor`, `lock_edges`; strand s has row `lock`[s]). Then, "
-    "with vertices 0 and 1 at rest, each vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
+    f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. D is the displacement of each strand, and L the mean of it over "
+    "the `valid` strands with the same `lock`. With vertices 0 and 1 at rest, each vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
     'it, scaled to the length that the edge has with D: its rest length, unless the model\'s `output` is "displacement"',
     "a game": _game("(steps + 2) dt / sqrt(weight)"),
     "blend shapes": "roots and `shape` here are those of the clip's first sample. If the animation changes blend shapes, a bake "

@@ -41,10 +41,7 @@ ARRAYS = {
     "stance": "(p, 3, 3) float64, of the pose joints in their order",
     "length": "(S,) float32, of each strand [m], for `clumping`",
     "tie": "(S,) float32, how firmly each strand is tied into its lock, for `clumping`",
-    "lock": "(S,) int32, each strand's lock as far as it is tied together, a row of the three that follow",
-    "lock_strand_part": f"(L, {HIDDEN}) float32, input of tail.onnx for the mean strand of each lock",
-    "lock_anchor": f"(L, {SHAPE}) float32, as `anchor`",
-    "lock_edges": f"(L, {SHAPE}) float32, as `edges`",
+    "lock": "(S,) int32, number of each strand's lock as far as it is tied together, for `clumping`",
 }
 """Arrays of a groom's file -> what they are."""
 LONGEST_NAME = 150
@@ -99,9 +96,8 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
     sampler = model.sampler(character, rig.clip)
     strands, held = GroomPlacer(item).strands, sampler.held_bind()
     locks = Locks.of(strands)
-    session, led = StrandSession(model, strands), StrandSession(model, locks.strands)
+    session = StrandSession(model, strands)
     session.anchor(held)
-    led.anchor(held)
     skeleton, joint = character.skeleton, character.carrying_joint
     arrays = {
         # What the network reads of a strand does not move with its root.
@@ -119,9 +115,6 @@ def tables(item: StageGroom, model: StrandModel) -> tuple[dict[str, np.ndarray],
         "length": strands.length.astype(np.float32),
         "tie": locks.tie.astype(np.float32),
         "lock": locks.lock.astype(np.int32),
-        "lock_strand_part": led.strand_part,
-        "lock_anchor": led.anchor_offsets,
-        "lock_edges": rest_edges(locks.strands.rest),
     }
     head, chest, *pose = (skeleton.names[joint] for joint in sampler.joints)
     return arrays, {"head": head, "upper chest": chest, "pose": pose}

@@ -41,7 +41,7 @@ def of(locks, **material):
 
 
 def test_a_lock_is_what_ties_join(locks):
-    assert len(locks.strands.rest) == len(LENGTHS) and len(np.unique(locks.lock[::EACH])) == len(LENGTHS)
+    assert len(np.unique(locks.lock)) == len(np.unique(locks.lock[::EACH])) == len(LENGTHS)
     np.testing.assert_allclose(
         np.square(locks.tie), EACH / (EACH - 1), rtol=1e-4
     )  # from the mean of the others, not of all
@@ -66,10 +66,31 @@ def test_a_hair_that_nothing_ties_goes_its_own_way(locks):
         return found, found.spread(Material(clumping=0.0).log_ratios())
 
     found, factor = law(0.03)
-    assert len(found.strands.rest) == 6 and (factor == 1).all()
+    assert len(np.unique(found.lock)) == 6 and (factor == 1).all()
     near, wide = law(0.003)[0], law(0.015)[0]
-    assert len(near.strands.rest) == len(wide.strands.rest) == 1
+    assert not near.lock.any() and not wide.lock.any()
     assert 0 < wide.tie[0] < 0.7 < near.tie[0]
+
+
+@pytest.mark.parametrize("clumping", RANGES["clumping"])
+def test_ties_move_hairs_within_their_lock_and_not_the_lock(locks, clumping):
+    """Hair that is swung sideways by one angle as a whole, and a little by each hair's own."""
+    own = np.random.default_rng(1).normal(0, 0.003, len(locks.lock))
+    angle = (0.03 + own) * (np.linspace(0, 1, K) > 1.5 / K)[:, None]
+    edges = np.diff(locks.rest, axis=1)
+    turned = np.stack(
+        [-np.sin(angle[1:].T) * edges[..., 1], np.cos(angle[1:].T) * edges[..., 1], edges[..., 2]], axis=-1
+    )
+    moved = np.zeros_like(locks.rest)
+    moved[:, 1:] = np.cumsum(turned - edges, axis=1)
+    after = locks.gather(moved.reshape(len(moved), -1), Material(clumping=clumping).log_ratios())(slice(None))
+    ways, strays = [], []
+    for each in (moved, after.reshape(moved.shape)):
+        means = each.reshape(len(LENGTHS), EACH, K, 3).mean(axis=1)
+        ways.append(means)
+        strays.append((each - np.repeat(means, EACH, axis=0))[:, -1, 0].reshape(len(LENGTHS), EACH))
+    np.testing.assert_allclose(strays[1], strays[0] * of(locks, clumping=clumping)[:, None], rtol=0.03)
+    assert np.abs(ways[1] - ways[0]).max() < 0.02 * np.abs(strays[1] - strays[0]).max()
 
 
 def test_the_default_changes_nothing(locks):
