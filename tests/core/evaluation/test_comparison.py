@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from neuralocks_core import metrics, rotation
 from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.evaluation import comparison
 from neuralocks_core.evaluation.comparison import simulated
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
@@ -151,3 +152,21 @@ def test_a_shot_that_ends_in_motion_is_felt_to_go_on():
     handles = simulated(character, lying_strands(character), Clip(times, joints), np.arange(36) / 24)
     np.testing.assert_allclose(handles[:24], found, atol=1e-5)
     assert np.abs(handles[24:] - handles[23]).max() > 1e-3, "and afterwards it stands"
+
+
+def test_a_volume_term_is_integrated_in_finer_steps(monkeypatch):
+    """Its force lags behind within a step, so that steps as long as for hair without it leave an error that nothing shows."""
+    rng, character = np.random.default_rng(0), person(HEAD.vertices + CENTRE, {})
+    roots = CENTRE + [0.11, 0, 0] + rng.uniform(-0.015, 0.015, (24, 1, 3)) * [1, 0, 1]
+    points = roots + np.linspace(0, -0.2, 24)[:, None] * [0, 1.0, 0]
+    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(24, 24))
+    origin = rigs.POSITIONS[rigs.HEAD]
+    strands = strand_set(groom, origin, CENTRE - origin, character.facing)
+    times, joints = pushed(25)
+    joints[:, :, 0, 3] = joints[0, :, 0, 3] + 0.15 * np.sin(9 * times)[:, None]
+    answers = {}
+    for substeps in (1, comparison.CROWDED_STEPS, 8):
+        monkeypatch.setattr(comparison, "CROWDED_STEPS", substeps)
+        answers[substeps] = simulated(character, strands, Clip(times, joints), times, volume=3.0)
+    coarse, ours, fine = answers.values()
+    assert np.sqrt(np.square(ours - fine).mean()) < 0.4 * np.sqrt(np.square(coarse - fine).mean()) > 1e-4
