@@ -68,6 +68,12 @@ class Placement:
         return self._still if self._still is not None else self.at(self.samples[0])
 
     @property
+    def lone_samples(self) -> list[float]:
+        """Time codes at which an exporter wrote a transform that does not move, of this prim or of one above."""
+        times = [xformable.GetTimeSamples() for xformable in _upwards(self.prim)]
+        return [own[0] for own in times if len(own) == 1]
+
+    @property
     def usable(self) -> bool:
         """Whether the prim can be placed at rest."""
         try:

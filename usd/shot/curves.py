@@ -82,6 +82,13 @@ def moment(prim: Usd.Prim) -> float | None:
     return float(points.GetTimeSamples()[0])
 
 
+def lone_sample(prim: Usd.Prim) -> list[float]:
+    """The time code at which an exporter wrote points that do not move, if it wrote them as a sample."""
+    points = UsdGeom.BasisCurves(prim).GetPointsAttr()
+    samples = [] if points.Get(Usd.TimeCode.Default()) is not None else points.GetTimeSamples()
+    return samples if len(samples) == 1 else []
+
+
 def left_as_they_are(prim: Usd.Prim) -> list[str]:
     """The notes on values that belong to the points at rest, which a bake does not carry along."""
     notes = []

@@ -22,7 +22,7 @@ from ..skel.skin import Skin
 from ..skel.stage_rig import StageRig
 from ..skel.surface import StageMesh
 from .curve_ends import Beyond, beyond_ends, ends
-from .curves import moment, rest_points
+from .curves import lone_sample, moment, rest_points
 
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
@@ -30,7 +30,7 @@ CLEARLY = 2
 """Hair must be this many times nearer to skin by a less likely way than by a likelier one for the former to count: hair that hovers
 over skin may come a little nearer by a wrong way, such as one that counts a parent's scale twice.
 """
-OFF_FACES, SURELY = 3e-3, 4
+SURELY = ((3e-3, 4), (1e-3, 12))
 """Roots that a likely way puts near skin, but the former [m] or more from its faces in the median, are taken by another way if that
 brings them this many times nearer to faces."""
 SOME_ROOTS, SOME_TIMES = 1000, 16
@@ -118,15 +118,17 @@ def _find_seat(
 
     for likely in (True, False):
         if best is not None and best.distance <= NEAR:
-            return _on_faces(best, roots, when, placement, drifts) or best
+            break
         for mesh, skin in zip(rig.meshes, rig.skins, strict=True):
             for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely, drifts=drifts)):
                 best = nearest(best, mesh, skin, (not likely, place), to_bind)
+    if best is not None and best.distance <= NEAR:
+        return _on_faces(best, roots, when, placement, drifts) or best
     return best if best is not None and best.distance <= within else None
 
 
 def _on_faces(seat: Seat, roots: np.ndarray, when: float | None, placement: Placement, drifts) -> Seat | None:
-    """The seat by an unlikely way that puts roots right onto the skin, near which they only are by the likely one; None if there is
+    """The seat by an unlikely way that puts roots right onto the skin, near which they only are by the given one; None if there is
     none. A head that turns by a few degrees before the shot begins leaves hair near its skin, but moved along it by centimetres.
     """
     near = []
@@ -135,9 +137,11 @@ def _on_faces(seat: Seat, roots: np.ndarray, when: float | None, placement: Plac
         middle = float(np.median(seat.skin.query(placed, seat.distance)[0]))
         if np.isfinite(middle):
             near.append(replace(seat, distance=middle, to_bind=to_bind, way=(True, place), roots=placed))
-    if not near or (surface := seat.rig.surface) is None or (off := _median_off(surface, seat.roots)) < OFF_FACES:
+    if not near or (surface := seat.rig.surface) is None or (off := _median_off(surface, seat.roots)) < SURELY[-1][0]:
         return None
-    return next((each for each in near if off >= SURELY * _median_off(surface, each.roots)), None)
+    best = min(near, key=lambda each: _median_off(surface, each.roots))
+    left = _median_off(surface, best.roots)
+    return best if any(off >= max(least, times * left) for least, times in SURELY) else None
 
 
 def _median_off(surface: Collider, points: np.ndarray) -> float:
@@ -175,8 +179,7 @@ def ways(
         return [_posed(rig, placement, when)] if likely else still
     with_skeleton, with_head = drifts or _drifts(rig, placement)
     if with_skeleton <= STEADY:
-        # Or it was made where the character stands when its motion begins, or the shot.
-        return still if likely else [_posed(rig, placement, code) for code in beginnings(rig)]
+        return still if likely else _elsewhere(rig, placement)
     # A prim that is moved along by its parents: where it stood relative to the head when that motion began.
     posed = [_posed(rig, placement, placement.samples[0])]
     if with_head <= STEADY:
@@ -201,6 +204,15 @@ def unsure(prim: Usd.Prim, seat: Seat, placement: Placement) -> list[str]:
         f"{prim.GetPath()}: its motion is neither that of {seat.rig.path} nor of the head, so its place at rest is a guess, "
         f"maybe wrong by {1000 * apart:.2g} mm; bind it to the skeleton"
     ]
+
+
+def _elsewhere(rig: StageRig, placement: Placement) -> list[np.ndarray]:
+    """Ways of hair that stands still, made on a head that is not in the bind pose: when its exporter wrote it, when the motion or
+    the shot begins, or in the rest pose, which USD shows of a character without its animation.
+    """
+    codes = dict.fromkeys([*lone_sample(placement.prim), *placement.lone_samples, *beginnings(rig)])
+    at_rest = np.linalg.inv(rig.carrying_at_rest) @ rig.border.to_core @ placement.reference
+    return [*(_posed(rig, placement, code) for code in codes), at_rest]
 
 
 def beginnings(rig: StageRig) -> list[float]:

@@ -99,11 +99,19 @@ class JointSource:
         """Joints (T, J, 4, 4) in stage world space at time codes (T,), as UsdSkel evaluates them."""
         # A shot may go on for thousands of frames after its animation: a pose that is held is computed once.
         codes, rows = np.unique(np.clip(time_codes, *self._keyed), return_inverse=True)
-        local = self.local(codes)
+        return np.stack([self.placement.at(t) for t in time_codes])[:, None] @ self._from_roots(self.local(codes))[rows]
+
+    @property
+    def at_rest(self) -> np.ndarray:
+        """Joints (J, 4, 4) in stage world space in the rest pose, which UsdSkel shows without an animation."""
+        return self.placement.reference @ self._from_roots(self.rest[None].copy())[0]
+
+    def _from_roots(self, local: np.ndarray) -> np.ndarray:
+        """Joints (T, J, 4, 4) in the skeleton's space, written over their local transforms."""
         for joint, parent in enumerate(self.parents):  # parents come first
             if parent >= 0:
                 local[:, joint] = local[:, parent] @ local[:, joint]
-        return np.stack([self.placement.at(t) for t in time_codes])[:, None] @ local[rows]
+        return local
 
     @cached_property
     def _keyed(self) -> tuple[float, float]:

@@ -67,6 +67,13 @@ class StageRig:
             self._carrying[key] = self.character.carrying(self.joints_at(time_code))
         return self._carrying[key]
 
+    @cached_property
+    def carrying_at_rest(self) -> np.ndarray:
+        """As `carrying_at`, in the rest pose."""
+        if "head" not in self.character.humanoid:
+            return np.eye(4)
+        return self.character.carrying(self._to_world @ self.source.at_rest @ self._trim)
+
     def joints_at(self, time_code: float) -> np.ndarray:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
         return self._to_world @ self.source.posed([time_code])[0] @ self._trim

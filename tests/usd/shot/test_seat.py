@@ -208,6 +208,45 @@ def test_hair_made_at_the_shots_first_frame_after_a_run_up(tmp_path, bound):
     assert "m from joint 'head'" in said and "keeps that distance" in said
 
 
+@pytest.mark.parametrize("written", ["points", "transform"])
+def test_hair_that_was_written_at_one_frame_lies_where_it_is_seen_then(tmp_path, written):
+    """Exporters write what does not move as a single sample, at the frame that is current."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    (rig,), stage = read_rigs(path), Usd.Stage.Open(str(path))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    points, rest = curves.GetPointsAttr(), np.asarray(curves.GetPointsAttr().Get())
+    head = rig.carrying_at(START)
+    if written == "points":
+        points.Clear()
+        points.Set(_rigid(rest, head), START)
+    else:
+        curves.AddTransformOp().Set(Gf.Matrix4d(*head.T.ravel().tolist()), START)
+    stage.Save()
+    (item,) = read_shot(path).grooms
+    np.testing.assert_allclose(item.groom.points, rest, atol=1e-6)
+
+
+@pytest.mark.parametrize("degrees", [4, 20, 90])
+def test_hair_made_on_a_character_in_its_rest_pose_is_on_the_head(tmp_path, degrees):
+    """Without its animation, USD shows a character in that pose, which need not be the bind pose."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    rests = UsdSkel.Skeleton(stage.GetPrimAtPath("/Hero/Rig")).GetRestTransformsAttr()
+    bent = np.array(rests.Get())
+    angle = np.radians(degrees)
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), np.sin(angle)], [0, -np.sin(angle), np.cos(angle)]])
+    bent[1, :3, :3] = bent[1, :3, :3] @ turn
+    rests.Set(Vt.Matrix4dArray.FromNumpy(bent))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    rest = np.asarray(points.Get())
+    stage.Save()
+    (rig,) = read_rigs(path)
+    points.Set(_rigid(rest, rig.carrying_at_rest))
+    assert np.abs(np.asarray(points.Get()) - rest).max() > 0.02
+    stage.Save()
+    np.testing.assert_allclose(read_shot(path).grooms[0].groom.points, rest, atol=2e-6)
+
+
 @pytest.mark.parametrize("lifted", [0.0, 0.4], ids=["some_roots_far", "most_roots_far"])
 def test_a_seat_within_a_bound_is_the_seat(tmp_path, lifted):
     """A crowd is searched with a bound: what is beyond it is not measured, and must not change the result."""
