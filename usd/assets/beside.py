@@ -22,6 +22,8 @@ READ = ("widths", rest_copy.NAME)
 WIDTH = "groom_width"
 """Widths once more [cm], which every import writes from those of the groom: an old one would keep the size that the hair had
 before a unit or a head changed it."""
+ELSEWHERE = ("primvars:", "xformOp:", "skel:", "userProperties:", "neuralocks:")
+"""How the names of attributes begin that are read elsewhere, or that say something of a file rather than of its hair."""
 OF_A_SPACE = (Sdf.ValueRoleNames.Point, Sdf.ValueRoleNames.Vector, Sdf.ValueRoleNames.Normal, Sdf.ValueRoleNames.Frame)
 """Roles of values that belong to the space which the curves come from."""
 
@@ -71,6 +73,9 @@ def read_beside(prim: Usd.Prim, groom: Groom, notes: list[str]) -> Beside:
         notes: what a user should know is added here.
     """
     primvars = _read_primvars(prim, groom, notes)
+    others = [each.GetName() for each in prim.GetAuthoredAttributes() if each.IsCustom()]
+    if others := [name for name in others if not name.startswith(ELSEWHERE)]:
+        notes.append(f"{prim.GetPath()}: {', '.join(others)} left out; only primvars are imported, make them primvars")
     material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
     if material:
         notes.append(f"{prim.GetPath()}: its material {material.GetPath()} is not imported; bind one to the new groom")
@@ -99,6 +104,8 @@ def _read_primvars(prim: Usd.Prim, groom: Groom, notes: list[str]) -> tuple[Prim
         elif why := "" if name.startswith("groom_") or name in KNOWN else _stays(primvar.GetTypeName()):
             notes.append(f"{path}: primvars:{name} {why}; left out")
         else:
+            if primvar.ValueMightBeTimeVarying():
+                notes.append(f"{path}: primvars:{name} changes over time; its first values are imported")
             found.append(Primvar(name, primvar.GetTypeName(), scope, each, value))
     return tuple(found)
 

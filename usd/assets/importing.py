@@ -24,7 +24,7 @@ from ..border.stage_files import OTHERS, USD, check_not_input, check_not_over, o
 from ..border.stopping import check
 from ..border.units import Border
 from ..shot.curve_ends import beyond_ends
-from ..shot.curves import find_curves, read_groom
+from ..shot.curves import find_curves, read_groom, widths_attribute
 from ..shot.notes import few, first_of, unlikely_head
 from ..shot.seat_notes import REVERSED
 from ..shot.stage import read_rigs, read_shot
@@ -195,7 +195,7 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
     for prim in find_curves(stage):
         curves = UsdGeom.BasisCurves(prim)
         groom = read_groom(prim, border.to_core @ _place(prim), notes)
-        if curves.GetWidthsAttr().ValueMightBeTimeVarying():
+        if widths_attribute(curves).ValueMightBeTimeVarying():
             notes.append(f"{prim.GetPath()}: its widths change over time; the first ones are imported")
         tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
         found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left), beyond_ends(prim)))

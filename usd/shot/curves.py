@@ -181,7 +181,7 @@ def _steady_counts(prim: Usd.Prim) -> np.ndarray:
 
 def widest_sample(prim: Usd.Prim) -> float:
     """The largest of a groom's widths that change over time, in the prim's own units; 0 where none do."""
-    attribute, widest = _widths_attribute(UsdGeom.BasisCurves(prim)), 0.0
+    attribute, widest = widths_attribute(UsdGeom.BasisCurves(prim)), 0.0
     for time in attribute.GetTimeSamples():
         with suppress(NeuralocksError):  # there is a note on widths of another type
             values = as_numbers(attribute, "float[]", attribute.Get(time), np.float32)
@@ -189,7 +189,7 @@ def widest_sample(prim: Usd.Prim) -> float:
     return widest
 
 
-def _widths_attribute(curves: UsdGeom.BasisCurves) -> Usd.Attribute:
+def widths_attribute(curves: UsdGeom.BasisCurves) -> Usd.Attribute:
     """The widths that count: a primvar of that name hides the curves' own."""
     primvar = UsdGeom.PrimvarsAPI(curves).GetPrimvar("widths")
     return primvar.GetAttr() if primvar and primvar.HasValue() else curves.GetWidthsAttr()
@@ -197,7 +197,7 @@ def _widths_attribute(curves: UsdGeom.BasisCurves) -> Usd.Attribute:
 
 def _widths(curves: UsdGeom.BasisCurves, counts: np.ndarray, scale: float, notes: list[str]) -> np.ndarray | None:
     """Widths [m] of points, strands or all: (P,), (S,) or (1,); None if the curves have none that make sense."""
-    attribute = _widths_attribute(curves)
+    attribute = widths_attribute(curves)
     primvar = UsdGeom.Primvar(attribute)
     try:
         values = as_numbers(

@@ -172,12 +172,26 @@ def _body(mesh: StageMesh, to_bind: np.ndarray, knots: dict[str, list[float]]) -
     return Body(*mesh.in_bind(to_bind), mesh.indices, mesh.weights, shapes)
 
 
+def _moves(attribute: Usd.Attribute, rest: np.ndarray) -> bool:
+    """Whether points leave those at rest (V, 3) in the first, the middle or the last of their samples: some exporters write the same
+    ones in each frame.
+    """
+    times = attribute.GetTimeSamples()
+    some = {times[0], times[len(times) // 2], times[-1]} if times else ()
+    return any(not np.array_equal(np.asarray(attribute.Get(time), rest.dtype), rest) for time in some)
+
+
 def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | None:
     mesh, path = UsdGeom.Mesh(prim), prim.GetPath()
     points = as_numbers(mesh.GetPointsAttr(), "point3f[]", rest_value(mesh.GetPointsAttr()))
     if not len(points):
         notes.append(f"{path}: the mesh has no points; left out of the body")
         return None
+    if _moves(mesh.GetPointsAttr(), points):
+        notes.append(
+            f"{path}: its points move before skinning; hair is kept out of it as its points are at rest; export that motion as "
+            "blend shapes"
+        )
     if not np.isfinite(points).all():
         raise NeuralocksError(f"{path}: the mesh's points hold NaN or infinity; repair it")
     triangles = _triangles(mesh, path, len(points))

@@ -122,6 +122,25 @@ def test_what_does_not_go_on_is_told(imported):
     assert not any(UsdGeom.PrimvarsAPI(prim).HasPrimvar(name) for name in ("Pref", "map", "few"))
 
 
+def test_attributes_of_other_tools_and_what_changes_are_told(imported):
+    names = Sdf.ValueTypeNames
+
+    def change(stage):
+        prim = stage.GetPrimAtPath("/Hero/Hair")
+        wet = UsdGeom.PrimvarsAPI(prim).CreatePrimvar("wet", names.Float, "constant").GetAttr()
+        for code in (1, 2):
+            wet.Set(0.5 * code, code)
+        for name in ("hair:guide_id", "userProperties:blender:data_name"):
+            prim.CreateAttribute(name, names.Int).Set(3)
+
+    prim, _, notes = imported(change)
+    assert sorted(notes) == [
+        "/Hero/Hair: hair:guide_id left out; only primvars are imported, make them primvars",
+        "/Hero/Hair: primvars:wet changes over time; its first values are imported",
+    ]
+    assert UsdGeom.PrimvarsAPI(prim).GetPrimvar("wet").Get() == 0.5
+
+
 @pytest.mark.parametrize("unit, centimetres", [(None, 0.01), ("mm", 0.001)])
 def test_the_width_that_other_tools_read_is_that_of_the_hair_as_imported(tmp_path, unit, centimetres):
     """An import writes it, so a groom that was imported before has one already."""

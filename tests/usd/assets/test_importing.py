@@ -71,8 +71,9 @@ def test_curves_are_put_on_a_head_by_what_is_drawn_of_them(basis, foreign, fitte
     curves.GetTypeAttr().Set("cubic")
     curves.CreateBasisAttr(basis)
     curves.CreateWrapAttr("nonperiodic")
+    sizes = UsdGeom.PrimvarsAPI(prim).CreatePrimvar("widths", Sdf.ValueTypeNames.FloatArray, "vertex").GetAttr()
     for code, times in ((1.0, 1.0), (2.0, 1.5)):
-        curves.GetWidthsAttr().Set(Vt.FloatArray([float(times * widths[0])] * len(widths)), code)
+        sizes.Set(Vt.FloatArray([float(times * widths[0])] * len(widths)), code)
     stage.Save()
     (groom,), notes = import_groom(path, tmp_path / "on.usda", character=BODY)
     assert any("its widths change over time" in note for note in notes)
