@@ -37,9 +37,11 @@ def request() -> None:
         bpy.app.timers.register(look, first_interval=PAUSE)
 
 
-def doubt() -> None:
-    """A rig has changed, perhaps only its pose: check soon whether its motion is out of date."""
-    _wanted["closely"] = True
+def doubt(closely: bool = True) -> None:
+    """A rig has changed, perhaps only its pose: check soon whether its motion is out of date; unless `closely`, only whether other
+    things are drawn or sampled.
+    """
+    _wanted["closely"] = _wanted["closely"] or closely
     if not _work:
         request()
 

@@ -79,6 +79,8 @@ def on_update(scene, graph):
     moving = frozenset(names).union(*(session.rigs[name].moved_by for name in names & session.rigs.keys()))
     if moving & objects.keys():
         background.doubt()
+    elif any(isinstance(thing, bpy.types.Scene) for thing in changed):  # a body may be drawn or hidden
+        background.doubt(closely=False)
     if names & objects.keys() or any(_edited(o.original) for o in objects.values()):
         live.update(scene, graph)
     _catch_up()

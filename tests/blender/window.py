@@ -35,6 +35,7 @@ def build():
     scene.frame_start, scene.frame_end = 1, 24
     rig = scenes.armature()
     scenes.dance(rig)
+    scenes.body(rig)
     hair = scenes.hair(rig, 300)
     scene.neuralocks.armature, scene.neuralocks.hair = rig, hair
     hair.neuralocks_hair.model = os.environ["NEURALOCKS_TEST_MODEL"]
@@ -89,6 +90,18 @@ def scrub():
     assert np.abs(shown() - state["twelve"]).max() == 0
 
 
+def draw_body(drawn: bool):
+    """Whether renders draw the body."""
+    bpy.data.objects["Body"].hide_render = not drawn
+
+
+def kept_out_of(*bodies: str):
+    """The background has noticed which bodies renders draw."""
+    from dcc_addon.session import session
+
+    assert session.rigs["Rig"].bodies == bodies and session.sampling is None
+
+
 def bake():
     """From the panel's operator, with progress."""
     window = bpy.context.window_manager.windows[0]
@@ -115,8 +128,9 @@ def _idle():
 
 
 STEPS = [build, _idle, mouse, lambda: mouse(click=True), _idle, lambda: mouse(TAB), lambda: mouse(click=True), _idle,
-         lambda: mouse(LIVE), lambda: mouse(click=True), _idle, picture, is_live, sampled, scrub, bake, baked,
-         picture]  # fmt: skip
+         lambda: mouse(LIVE), lambda: mouse(click=True), _idle, picture, is_live, sampled, scrub,
+         lambda: draw_body(False), lambda: kept_out_of(), lambda: draw_body(True), lambda: kept_out_of("Body"),
+         bake, baked, picture]  # fmt: skip
 
 
 def tick():
