@@ -50,7 +50,7 @@ def main() -> None:
     load = cache(StrandModel.load)
     bench = Bench(CHARACTER, arguments.style or list(STYLES), [], None)
     if arguments.motion:
-        from usd.models.training_scene import read_clip
+        from usd.models.clip_file import read_clip
 
         clips = {path.rsplit("/", 1)[-1]: read_clip(path, bench.character) for path in arguments.motion}
     else:

@@ -171,7 +171,7 @@ def main() -> None:
     for own in models.values():
         own |= {"static": load(arguments.static)} if arguments.static else {}
     if arguments.motion:
-        from usd.models.training_scene import read_clip
+        from usd.models.clip_file import read_clip
 
         clips = {path.rsplit("/", 1)[-1]: read_clip(path, bench.character) for path in arguments.motion}
     else:

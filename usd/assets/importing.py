@@ -24,8 +24,10 @@ from ..border.stage_files import OTHERS, USD, check_not_input, check_not_over, o
 from ..border.stopping import check
 from ..border.units import Border
 from ..shot.curve_ends import beyond_ends
-from ..shot.curves import find_curves, read_groom, widths_attribute
+from ..shot.curves import find_curves, read_groom, widths_attribute, without_points
+from ..shot.groom_notes import no_points
 from ..shot.notes import few, first_of, unlikely_head
+from ..shot.rig_controls import is_closed
 from ..shot.seat_notes import REVERSED
 from ..shot.stage import read_rigs, read_shot
 from ..skel.binding import bound_skeleton, geom_bind
@@ -192,7 +194,17 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
     metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
     border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
     found, notes, left = [], [], []
-    for prim in find_curves(stage):
+    every = find_curves(stage)
+    hair = [prim for prim in every if not is_closed(prim)] or every
+    closed, empty = [prim for prim in every if prim not in hair], without_points(hair)
+    notes += few(
+        [
+            f"{prim.GetPath()}: its curves are closed, as a rig's controls are; left out: set their wrap to pinned if they are hair"
+            for prim in closed
+        ]
+    )
+    notes += few([no_points(str(prim.GetPath())) for prim in empty])
+    for prim in (prim for prim in hair if prim not in empty):
         curves = UsdGeom.BasisCurves(prim)
         groom = read_groom(prim, border.to_core @ _place(prim), notes)
         if widths_attribute(curves).ValueMightBeTimeVarying():

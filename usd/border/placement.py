@@ -30,10 +30,15 @@ class Unplaced(NeuralocksError):
 
 
 class Placement:
-    """Local-to-world transforms of one prim in stage space; evaluated once where nothing above it moves."""
+    """Local-to-world transforms of one prim in stage space; evaluated once where nothing above it moves.
 
-    def __init__(self, prim: Usd.Prim):
-        self.prim = prim
+    Args:
+        prim: what is placed.
+        brought: from its stage's space to the one that is meant (4, 4), if that is another stage's.
+    """
+
+    def __init__(self, prim: Usd.Prim, brought: np.ndarray | None = None):
+        self.prim, self.brought = prim, brought
         self.samples: list[float] = []
         for xformable in _upwards(prim):
             if xformable.TransformMightBeTimeVarying():
@@ -106,7 +111,7 @@ class Placement:
                 when = "" if code is None else f" at time code {code:g}"
                 whose = self.whose(wrong, code)
                 raise Unplaced(self.prim, f"{whose}{when} {fact}; {remedy}")
-        return matrix
+        return matrix if self.brought is None else self.brought @ matrix
 
 
 def _upwards(prim: Usd.Prim) -> Iterator[UsdGeom.Xformable]:

@@ -2,7 +2,7 @@
 """Where a stage's unit, up axis and rate are converted to metres, Y up and seconds: once, here."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom
@@ -89,6 +89,13 @@ class Border:
     def time_codes(self, seconds) -> np.ndarray:
         """Time codes of times [s]."""
         return np.asarray(seconds, float) * self.rate
+
+    def unless_told(self, stage: Usd.Stage) -> "Border":
+        """That of a stage that is read beside this one's; what it does not tell is as here."""
+        other = Border.of(stage)
+        unit = other.metres_per_unit if stage.HasAuthoredMetadata("metersPerUnit") else self.metres_per_unit
+        up = other.up_axis if stage.HasAuthoredMetadata("upAxis") else self.up_axis
+        return replace(other, metres_per_unit=unit, up_axis=up)
 
     @classmethod
     def of(cls, stage: Usd.Stage) -> "Border":

@@ -4,15 +4,15 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from pxr import Usd, UsdSkel
+from pxr import Usd
 
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.animation.random_motion import check_weights
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
-from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
 from neuralocks_core.training.rollouts import LEAST, TrainingScene
@@ -21,21 +21,18 @@ from ..assets.grow import Barber
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import check_file, open_stage
-from ..border.units import Border
-from ..border.values import as_names
 from ..shot.alike import one_person
 from ..shot.attach import attach, of_another
 from ..shot.curve_ends import groom_between
-from ..shot.curves import find_curves
-from ..shot.lacking import nothing_found
-from ..shot.motion_notes import motion_notes
-from ..shot.notes import few, first_of, unfound, unlikely_head, without_turn
+from ..shot.curves import find_curves, without_points
+from ..shot.notes import few, first_of, unfound, unlikely_head
 from ..shot.rig_controls import is_closed
 from ..shot.skeletons import read_each_rig
 from ..shot.stage import read_rigs
 from ..skel.binding import bound_skeleton
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
+from .clip_file import read_clip
 
 LIBRARY = "library"
 """A groom of this name stands for every style of the procedural library, grown on the character."""
@@ -138,11 +135,22 @@ def _file(
     if not prims:
         raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")
     prims = [prim for prim in prims if not is_closed(prim)] or prims
+    empty = without_points(prims)
+    prims, brought = [prim for prim in prims if prim not in empty], None
     if stage.GetRootLayer() == rig.source.prim.GetStage().GetRootLayer():
         prims = _own(prims, rig, head, joints, notes)
-    found = [(prim, attach(prim, [rig], Placement(prim), head, notes)) for prim in prims]
+    else:
+        brought = rig.border.from_core @ rig.border.unless_told(stage).to_core
+    found = [(prim, attach(prim, [rig], Placement(prim, brought), head, notes)) for prim in prims]
     # If there is hair, far curves such as the grass of a set are not hair; nor are the rig's controls.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
+    notes += [
+        f"{prim.GetPath()}: lies {a.far:.3g} m from joint '{leaf(a.rig.source.names[a.character.carrying_joint])}' of {rig.path} and on "
+        "no skin, so this trains on hair that is not on the head; put it where the head is in the bind pose, and check the file's "
+        "metersPerUnit and upAxis"
+        for prim, a in near
+        if a.far
+    ]
     found = [_strands(groom_between(prim, a.to_bind, notes, drawn=a.drawn)[0], a.character) for prim, a in near]
     if not any(strands.valid.any() for strands in found):
         raise NeuralocksError(f"{source}: no strand has two distinct points; there is nothing to learn from")
@@ -194,43 +202,3 @@ def _strands(groom: Groom, character: Character) -> StrandSet:
     if len(strands.rest) <= MOST_STRANDS:
         return strands
     return strands.subset(strands.whole_locks(MOST_STRANDS))  # neighbours stay neighbours
-
-
-@names_damage
-def read_clip(path: str, character: Character, notes: list[str] | None = None) -> Clip:
-    """Motion of a file on a character: BVH is retargeted; a USD skeleton must have the same joints.
-
-    Args:
-        path: the file.
-        character: who is to move.
-        notes: what a user should know about BVH is added here.
-
-    Raises:
-        NeuralocksError: it holds no such motion.
-    """
-    if Path(path).suffix.lower() == ".bvh":
-        from neuralocks_core.animation.retarget import retarget
-        from neuralocks_core.formats.bvh import read_bvh
-
-        captured = read_bvh(path)
-        clip = retarget(captured, character)
-        if notes is not None:
-            notes += motion_notes(captured, clip.joints, character.humanoid)
-        return clip
-    stage, names = open_stage(path), character.skeleton.names
-    prims = find_skeletons(stage)
-    if not prims:
-        raise nothing_found(stage, Path(path), "UsdSkel skeleton", "give motion of the character's joints, or BVH")
-    listed = [UsdSkel.Skeleton(prim).GetJointsAttr() for prim in prims]
-    alike = [prim for prim, joints in zip(prims, listed) if as_names(joints, joints.Get()) == names]
-    if not alike:
-        raise NeuralocksError(f"{path}: its skeleton is not the character's; give motion of the same joints, or BVH")
-    rigs, errors = read_each_rig(stage, alike, Border.of(stage), names[character.head], all_shapes=True)
-    if not rigs:
-        raise errors[0]
-    moving = [rig for rig in rigs if len(rig.clip.times) > 1]
-    if not moving:
-        raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
-    if stops := without_turn(moving[0]):
-        raise NeuralocksError(stops[0])
-    return moving[0].clip

@@ -17,6 +17,7 @@ from ..shot.made_from import baked_from_others
 from ..shot.recorded import recorded_cuts, recorded_joint, retimed
 from ..shot.stage import Shot, StageGroom, read_shot
 from ..skel.stage_rig import StageRig
+from ..skel.surface import drawn
 
 MOST_BODY_POINTS = 400_000
 """Largest number of body points drawn in a preview."""
@@ -82,9 +83,10 @@ class Baked:
         )
 
     def scene(self) -> Scene:
-        """All grooms of the first groom's skeleton and its body, for a preview."""
-        first = self.shot.grooms[0].attachment
-        items = [item for item in self.shot.grooms if item.attachment.rig is first.rig]
+        """All grooms of the first groom's skeleton and its body, for a preview; hidden ones only if nothing else is there."""
+        seen = [item for item in self.shot.grooms if drawn(item.prim)] or self.shot.grooms
+        first = seen[0].attachment
+        items = [item for item in seen if item.attachment.rig is first.rig]
         character, rig = first.character, first.rig
         body = character.body if character.body is not None and len(character.body.points) <= MOST_BODY_POINTS else None
         head = np.stack([character.carrying(rig.joints_at(code)) for code in self.codes])

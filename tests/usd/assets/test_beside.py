@@ -156,3 +156,20 @@ def test_the_width_that_other_tools_read_is_that_of_the_hair_as_imported(tmp_pat
     width = UsdGeom.PrimvarsAPI(hair).GetPrimvar("groom_width").Get()
     np.testing.assert_allclose(width, centimetres, rtol=1e-5)
     np.testing.assert_allclose(width, 100 * np.array(UsdGeom.BasisCurves(hair).GetWidthsAttr().Get()), rtol=1e-6)
+
+
+def test_empty_and_closed_curves_beside_the_hair_are_left_out(imported):
+    """As exporters leave them behind: a prim without points, and a rig's controls."""
+
+    def change(stage):
+        layer = stage.GetRootLayer()
+        Sdf.CopySpec(layer, "/Hero/Hair", layer, "/Hero/Control")
+        UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Control")).CreateWrapAttr("periodic")
+        UsdGeom.BasisCurves.Define(stage, "/Hero/Empty").CreatePointsAttr([])
+
+    prim, stage, notes = imported(change)
+    assert prim and len([each for each in stage.Traverse() if each.IsA(UsdGeom.BasisCurves)]) == 1
+    assert sorted(notes) == [
+        "/Hero/Control: its curves are closed, as a rig's controls are; left out: set their wrap to pinned if they are hair",
+        "/Hero/Empty: the curves have no points; left out",
+    ]

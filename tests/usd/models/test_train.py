@@ -3,8 +3,9 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom, UsdSkel
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core import model
 from neuralocks_core.boundary_spec import BoundarySpec
@@ -16,11 +17,12 @@ from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression_options import RegressionOptions
 from usd.assets.grow import grow
 from usd.cli.train import one_by_one
+from usd.models.clip_file import read_clip
 from usd.models.train import _command, begins_with, train
-from usd.models.training_scene import MOST_STRANDS, read_clip, training_scene
+from usd.models.training_scene import MOST_STRANDS, training_scene
 from usd.shot.stage import read_rigs
 
-from ..shots import HAIR, Recipe, write_shot
+from ..shots import HAIR, PARENTS, Recipe, write_shot
 
 BODY = Path(__file__).parents[3] / "examples/shot/body.usdc"
 SPEC, OTHER = BoundarySpec(), BoundarySpec(bins=(1,) * 30)
@@ -160,6 +162,77 @@ def test_motion_of_a_character_whose_head_has_another_name_needs_no_second_word(
     layer.Export(str(tmp_path / "other.usda"))
     with pytest.raises(NeuralocksError, match="other.usda: its skeleton is not the character's"):
         read_clip(str(tmp_path / "other.usda"), character)
+
+
+@pytest.mark.parametrize("character", [Recipe(bound="mesh"), Recipe(bound="mesh", unit=0.01, up="Z")])
+@pytest.mark.parametrize("groom", [{}, {"unit": 0.01}, {"up": "Z"}, {"unit": 0.01, "up": "Z"}])
+def test_a_groom_in_a_file_of_its_own_has_that_files_unit_and_axis(tmp_path, character, groom):
+    """Or the character's, as far as its file does not tell."""
+    path, groom, told = write_shot(tmp_path, character), Recipe(bound="none", **groom), []
+    hair = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, groom, "groom")))
+    del hair.GetPrimAtPath("/Hero").nameChildren["Rig"]
+    hair.Export(str(tmp_path / "alone.usda"))
+    wanted = training_scene(path).grooms[0]
+    found = training_scene(path, [str(tmp_path / "alone.usda")], tell=told.extend).grooms[0]
+    np.testing.assert_allclose(found.rest, wanted.rest, atol=2e-6)
+    assert not any("lies" in note for note in told)
+    if (groom.unit, groom.up) == (character.unit, character.up):
+        for name in ("metersPerUnit", "upAxis"):
+            hair.pseudoRoot.ClearInfo(name)
+        hair.Export(str(tmp_path / "untold.usda"))
+        again = training_scene(path, [str(tmp_path / "untold.usda")]).grooms[0]
+        np.testing.assert_array_equal(again.rest, found.rest)
+
+
+def test_a_groom_that_is_not_on_the_head_and_empty_curves_are_told(tmp_path):
+    path, told = write_shot(tmp_path, Recipe(bound="mesh")), []
+    stage = Usd.Stage.CreateNew(str(tmp_path / "away.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    curves = UsdGeom.BasisCurves.Define(stage, "/Hair")
+    curves.CreatePointsAttr([(x, 9.0, 0.1 * i) for x in range(6) for i in range(4)])
+    curves.CreateCurveVertexCountsAttr([4] * 6)
+    UsdGeom.BasisCurves.Define(stage, "/Empty").CreatePointsAttr([])
+    stage.Save()
+    training_scene(path, [str(tmp_path / "away.usda")], tell=told.extend)
+    assert [note for note in told if note.startswith("/Hair: lies ") and "check the file's metersPerUnit" in note]
+
+
+@pytest.mark.parametrize("change", ["turned", "halved"])
+def test_motion_of_the_same_joints_in_other_axes_or_places_moves_the_character_alike(tmp_path, change):
+    """Two exporters give one rig other joint axes; another person's rig may have the same names."""
+    path, notes = write_shot(tmp_path, Recipe(bound="mesh")), []
+    character = read_rigs(path)[0].character
+    stage = Usd.Stage.Open(str(path))
+    wanted = read_clip(str(path), character)
+    if change == "halved":
+        UsdGeom.Xformable(stage.GetPrimAtPath("/Hero")).AddScaleOp().Set((0.5, 0.5, 0.5))
+    else:
+        turn = np.eye(4)
+        turn[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+        skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Hero/Rig"))
+        binds = np.array(skeleton.GetBindTransformsAttr().Get())
+        skeleton.GetBindTransformsAttr().Set(Vt.Matrix4dArray.FromNumpy(turn @ binds))
+        motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+        for code in motion.GetRotationsAttr().GetTimeSamples():
+            local = np.array(UsdSkel.MakeTransforms(*(a.Get(code) for a in _channels(motion))))
+            roots = np.array([parent < 0 for parent in PARENTS])
+            turned = np.where(roots[:, None, None], turn @ local, turn @ local @ turn.T)
+            parts = UsdSkel.DecomposeTransforms(Vt.Matrix4dArray.FromNumpy(turned))
+            for attribute, values in zip(_channels(motion), parts, strict=True):
+                attribute.Set(values, code)
+    stage.Save()
+    clip = read_clip(str(path), character, notes)
+    turns = [character.relative_rotations(each.joints, np.arange(4)) for each in (wanted, clip)]
+    np.testing.assert_allclose(turns[1], turns[0], atol=1e-4 if change == "turned" else 2e-2)
+    ratio = [np.ptp(each.joints[:, 3, :3, 3], axis=0) for each in (wanted, clip)]
+    np.testing.assert_allclose(ratio[1], ratio[0], atol=1e-4 if change == "turned" else 2e-2)
+    assert [note.endswith("as a BVH's is") for note in notes if "bind pose is not" in note] == [True] * (
+        change == "halved"
+    )
+
+
+def _channels(motion: UsdSkel.Animation) -> list[Usd.Attribute]:
+    return [motion.GetTranslationsAttr(), motion.GetRotationsAttr(), motion.GetScalesAttr()]
 
 
 def test_options_take_as_many_words_as_follow():

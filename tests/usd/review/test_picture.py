@@ -5,7 +5,7 @@ import inspect
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
@@ -115,3 +115,19 @@ def test_clothes_begin_at_the_shoulders_that_the_skeleton_has(hair):
     low, high, aside = baked.scene().collar
     assert (low, high) == pytest.approx(sorted((shoulder[1], neck[1]))) and high - low > 0.05
     assert aside == pytest.approx(np.linalg.norm((shoulder - neck)[[0, 2]]), rel=0.05)
+
+
+@pytest.mark.parametrize("hidden", [["Hair"], ["Hair", "Long"], []])
+def test_hair_that_a_renderer_hides_is_not_drawn(tmp_path, hidden):
+    """Such as a second hairstyle, or simulation guides; a bake of nothing else is drawn."""
+    path = write_shot(tmp_path, Recipe(bound="mesh", strands=4))
+    stage = Usd.Stage.Open(str(path))
+    layer = stage.GetRootLayer()
+    Sdf.CopySpec(layer, "/Hero/Hair", layer, "/Hero/Long")
+    if hidden:
+        UsdGeom.Imageable(stage.GetPrimAtPath("/Hero/Hair")).CreateVisibilityAttr("invisible")
+    if "Long" in hidden:
+        UsdGeom.Imageable(stage.GetPrimAtPath("/Hero/Long")).CreatePurposeAttr("guide")
+    stage.Save()
+    bake(path, tmp_path / "hair.usda", frames="1:2")
+    assert len(read_baked(tmp_path / "hair.usda").scene().counts) == (4 if hidden == ["Hair"] else 8)

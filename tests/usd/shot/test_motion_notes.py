@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from usd.models.training_scene import read_clip
+from usd.models.clip_file import read_clip
 from usd.review.inspect import inspect
 from usd.shot.stage import read_rigs
 
