@@ -10,7 +10,8 @@ from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.hair_names import says_face, says_hair, says_hair_alone
-from neuralocks_core.rig.measuring import driving, measured_chains, riders
+from neuralocks_core.rig.measuring import measured_chains
+from neuralocks_core.rig.riding import continued, driving, riders
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 UNNAMED = 3
@@ -59,11 +60,19 @@ def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHair
     remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
     # Outside the head, `tail` means a tail.
     elsewhere = [j for j in np.flatnonzero(~below) if says_hair_alone(names[j])]
-    bare = [j for j in np.flatnonzero(below) if j not in character.heads and says_hair(names[j])]
+    drives = driving(skeleton, meshes)
+    named = [j for j in np.flatnonzero(below) if j not in character.heads and says_hair(names[j])]
+    bare = [j for j in named if not drives[j]]
+    caps = [j for j in named if meshes and _is_cap(character, j, meshes)]
     unnamed = left_out(character, meshes or [])
     if elsewhere and skeleton.parents[elsewhere[0]] >= 0:
         first, above = leaf(names[elsewhere[0]]), leaf(names[skeleton.parents[elsewhere[0]]])
         remedy = f"'{first}' hangs from '{above}': name that with --head {above}"
+    elif caps:
+        remedy = (
+            f"'{leaf(names[caps[0]])}' drives all hair on the skull, which goes through it if it turns: give locks joints of their own, "
+            f"or name it with --chains {leaf(names[caps[0]])}"
+        )
     elif meshes and bare:
         remedy = f"'{leaf(names[bare[0]])}' drives no vertex of a mesh: bind the hair's mesh to it"
     elif unnamed:
@@ -162,6 +171,7 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
     skeleton = character.skeleton
     names, children = skeleton.names, skeleton.children
     used, body = driving(skeleton, meshes), of_the_body(character, meshes)
+    least = 2 if _has_leaf_bones(character, used) else 1
     tops, todo = [], [(joint, False) for joint in _children(character)]
     while todo:
         joint, worn = todo.pop()
@@ -177,15 +187,20 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
         if (not used[joint] and below and not steered) if meshes else len(below) > 1:
             todo += below
             continue
-        strange = len(tree) > 1 and meshes and not body[tree].any() and not any(says_face(names[j]) for j in tree)
-        holds = used[tree[1:]].any() and (
-            _is_cap(character, joint, meshes) or _only_shares(skeleton, joint, used, meshes)
-        )
+        strange = len(tree) > least and meshes and not body[tree].any() and not any(says_face(names[j]) for j in tree)
+        holds = bool(meshes) and (_is_cap(character, joint, meshes) or _only_shares(skeleton, joint, used, meshes))
         if not hair and (worn or not strange) or holds:
             todo += below
         else:
             tops.append(joint)
     return tops
+
+
+def _has_leaf_bones(character: Character, used: np.ndarray) -> bool:
+    """Whether an exporter gave each last joint an end joint, also those of hands and feet: then a rigid part has one, too."""
+    children, body = character.skeleton.children, np.flatnonzero(used & ~character.of_head)
+    ends = [joint for joint in body if not any(used[child] or children[child] for child in children[joint])]
+    return bool(ends) and all(children[joint] for joint in ends)
 
 
 def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[SkinnedMesh] | None) -> list[int]:
@@ -195,7 +210,7 @@ def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[Sk
     skeleton = character.skeleton
     riding = riders(skeleton, joint, used)
     on = [child for child in skeleton.children[joint] if child not in riding and used[skeleton.below(child)].any()]
-    if used[joint] or len(on) != 1 or used[on[0]] or not riders(skeleton, on[0], used):
+    if used[joint] or len(on) != 1 or used[on[0]] or not riders(skeleton, continued(skeleton, on[0], used), used):
         return []
     return [] if any(_is_cap(character, rider, meshes) for rider in riding) else riding
 

@@ -35,7 +35,8 @@ _FACE_ANYWHERE = re.compile(
     "|下巴|蝴蝶结|눈|턱|혀|귀|안경|모자"
 )
 _WORN_IN_HAIR = re.compile(
-    r"hair(?:pin|clip|band|tie|bow|acc|ornament|decor|net|flower|feather|rope|ring(?!let))|ribbon"
+    r"hair_?(?:pin|clip|band|tie|bow|acc(?:es?|essor(?:y|ies))?|ornament|deco(?:r|rations?)?|net|flower|feather|rope|ring)s?"
+    r"(?![a-z]|_(?:curl|braid|lock))|ribbon"
     r"|リボン|리본|飾|饰|ヘア(?:ピン|バンド|ゴム)|髪(?:かざり|留|止|ゴム)|发(?:带|夹|卡|箍|簪|圈|绳)"
 )
 """Ribbons and pins are stiff or have their own animation: they ride on the hair or the head."""
@@ -65,12 +66,17 @@ def says_hair_alone(name: str) -> bool:
 def says_face(name: str) -> bool:
     """Whether a joint's path or name means a part of the face, or what a head wears."""
     whole = _whole(name)
-    return bool(_begins(name, _FACE) or _FACE_ANYWHERE.search(whole) or _WORN_IN_HAIR.search(whole))
+    return bool(_begins(name, _FACE) or _FACE_ANYWHERE.search(whole) or _worn_in_hair(name))
 
 
 def _no_hair(name: str) -> bool:
     """Whether a name that has a word for hair means what is worn in it, or skin."""
-    return bool(_WORN_IN_HAIR.search(_whole(name))) or words(_own(name))[:1] == [_SCALP]
+    return _worn_in_hair(name) or words(_own(name))[:1] == [_SCALP]
+
+
+def _worn_in_hair(name: str) -> bool:
+    """A word alone counts: `hair_pin_L` is worn, `hair_pinned_L` is hair."""
+    return any(_WORN_IN_HAIR.search(each) for each in (_whole(name), "_".join(words(_own(name)))))
 
 
 def _begins(name: str, beginnings: str) -> bool:

@@ -9,11 +9,10 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.riding import NO_BONE, continued, driving, in_chains, riders
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import rotation_part
 
-NO_BONE = 1e-5
-"""Shorter bones [m] have no direction."""
 DRIVEN = 0.3
 """Skin on which a joint has more than this weight determines how far its bone reaches."""
 UNEVEN = 1.01
@@ -64,7 +63,7 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
         raise NeuralocksError(
             f"skeleton: {below.count(double)} joints below the head are named '{double}', like a hair chain; rename all but that one"
         )
-    parents = np.array([rows.get(int(skeleton.parents[j]), -1) if j not in tops else -1 for j in joints], int)
+    parents = _parents(skeleton, rows)
     chain = np.zeros(len(joints), int)
     for row, parent in enumerate(parents):
         chain[row] = chain[parent] if parent >= 0 else (parents[:row] < 0).sum()
@@ -96,9 +95,19 @@ def placed_chains(chains: HairChains, character: Character) -> HairChains:
     skeleton = character.skeleton
     joints = chains.match(skeleton.names, character.of_head)
     rows = {int(joint): row for row, joint in enumerate(joints)}
-    parents = [rows.get(int(skeleton.parents[joint]), -1) for joint in joints]
     origins, axes = _origins_and_axes(character, joints)
-    return replace(chains, joints=joints, parents=parents, origins=origins, axes=axes)
+    return replace(chains, joints=joints, parents=_parents(skeleton, rows), origins=origins, axes=axes)
+
+
+def _parents(skeleton: Skeleton, rows: dict[int, int]) -> np.ndarray:
+    """Row of the moving joint that carries each one (N,), -1 if none does; between the two may be joints that do not move."""
+    found = []
+    for joint in rows:
+        up = int(skeleton.parents[joint])
+        while up >= 0 and up not in rows:
+            up = int(skeleton.parents[up])
+        found.append(rows.get(up, -1))
+    return np.array(found, int)
 
 
 def _origins_and_axes(character: Character, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -109,58 +118,43 @@ def _origins_and_axes(character: Character, joints: np.ndarray) -> tuple[np.ndar
     return character.canonical(bind[:, :3, 3]), axes
 
 
-def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
-    """Leaf joints at a joint's own position that drive skin, such as the deform joints of a control rig: they turn with it.
-
-    Args:
-        skeleton: bind pose, in which positions are compared [m].
-        joint: index in the skeleton.
-        drives: which joints drive skin, (J,) bool.
-    """
-    places = skeleton.bind[:, :3, 3]
-    last = [child for child in skeleton.children[joint] if drives[child] and not skeleton.children[child]]
-    return [child for child in last if np.linalg.norm(places[child] - places[joint]) < NO_BONE]
-
-
 def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -> tuple[dict, dict, dict]:
     """Three dicts of the joints that move: their row among the hair joints; the free end of their bone (3,) [m], if they have one;
     and the joints at the other ends of their bones.
     """
     skeleton = character.skeleton
     drives = driving(skeleton, meshes)
-    order = np.flatnonzero(np.any([skeleton.below(top) for top in tops], axis=0)).tolist()
+    order = in_chains(skeleton, tops, drives)
     carries = _carrying(skeleton, order, drives)
     rows, free, ends = {}, {}, {}
     for joint in order:
+        if continued(skeleton, joint, drives) != joint:
+            continue
         riding = riders(skeleton, joint, drives)
-        beyond = [child for child in skeleton.children[joint] if child not in riding]
+        beyond = [child for child in skeleton.children[joint] if child in order]
+        # What has no skin beside what has some is a socket or a pole, and not where the bone ends.
+        beyond = [child for child in beyond if child in carries] or beyond
         own, only_markers = [joint, *riding], joint in carries and not carries.intersection(beyond)
         end = None
         if not beyond or only_markers and _astray(character, own, beyond, joint in tops, meshes, places):
             end = _free_end(character, own, joint in tops, meshes, places)
             beyond = beyond if end is None else []
         if beyond and joint in carries or end is not None:
-            rows[joint], free[joint], ends[joint] = len(rows), end, beyond
+            rows[joint], free[joint] = len(rows), end
+            ends[joint] = [continued(skeleton, child, drives) for child in beyond]
     return rows, free, ends
-
-
-def driving(skeleton: Skeleton, meshes: list[SkinnedMesh] | None) -> np.ndarray:
-    """Which joints (J,) bool drive skin of any mesh."""
-    drives = np.zeros(len(skeleton.names), bool)
-    for mesh in meshes or ():
-        drives |= mesh.driven_by(len(drives))
-    return drives
 
 
 def _bones(skeleton: Skeleton, rows: dict, free: dict, ends: dict, places: np.ndarray) -> tuple[list, list, np.ndarray]:
     """Each bone's joint and the moving one at its end (-1: none), as rows, and its vector (M, 3) [m]."""
     bone_joint, bone_end, bones = [], [], []
     for joint, row in rows.items():
-        for end, place in [(rows.get(child, -1), places[child]) for child in ends[joint]] or [(-1, free[joint])]:
+        for child in ends[joint] or [None]:
+            end, place = (-1, free[joint]) if child is None else (rows.get(child, -1), places[child])
             if np.linalg.norm(place - places[joint]) < NO_BONE:
-                child = next((leaf(skeleton.names[c]) for c in ends[joint]), "its end")
+                there = "its end" if child is None else leaf(skeleton.names[child])
                 raise NeuralocksError(
-                    f"skeleton: hair bone '{leaf(skeleton.names[joint])}' has no length ('{child}' lies at the same place); "
+                    f"skeleton: hair bone '{leaf(skeleton.names[joint])}' has no length ('{there}' lies at the same place); "
                     "move or remove one of the two, or leave the chain out with --chains"
                 )
             bone_joint.append(row)
@@ -191,11 +185,11 @@ def _free_end(character: Character, own: list[int], is_top: bool, meshes, places
         is_top: a chain of this joint alone, which points where its skin does; others continue the bone before.
         places: positions of all joints in canonical space, (J, 3) [m].
     """
-    joint, parent = own[0], int(character.skeleton.parents[own[0]])
+    joint = own[0]
     reach = _reach(character, own, meshes, places)
     if not len(reach):
         return None
-    along = reach.mean(axis=0) if is_top else places[joint] - places[parent]
+    along = reach.mean(axis=0) if is_top else _before(character.skeleton, joint, places)
     size = np.linalg.norm(along)
     if size < NO_BONE:
         return None
@@ -205,6 +199,14 @@ def _free_end(character: Character, own: list[int], is_top: bool, meshes, places
     if length < (SHORT if is_top else SHORT_AFTER * size):
         return None
     return places[joint] + length * along
+
+
+def _before(skeleton: Skeleton, joint: int, places: np.ndarray) -> np.ndarray:
+    """From the start of the bone before a joint to the joint (3,) [m]."""
+    up = int(skeleton.parents[joint])
+    while np.linalg.norm(places[joint] - places[up]) < NO_BONE and skeleton.parents[up] >= 0:
+        up = int(skeleton.parents[up])
+    return places[joint] - places[up]
 
 
 def _astray(character: Character, own: list[int], markers: list[int], is_top: bool, meshes, places: np.ndarray) -> bool:
@@ -221,7 +223,7 @@ def _astray(character: Character, own: list[int], markers: list[int], is_top: bo
     sizes = np.linalg.norm(ends, axis=1)
     if (sizes < NO_BONE).all():
         return True
-    ways = [reach.mean(axis=0)] + ([] if is_top else [places[own[0]] - places[character.skeleton.parents[own[0]]]])
+    ways = [reach.mean(axis=0)] + ([] if is_top else [_before(character.skeleton, own[0], places)])
     off = [ends @ way < ASTRAY * sizes * np.linalg.norm(way) for way in ways]
     bare = (reach @ ends.T).max(axis=0) < COVERED * sizes**2
     return bool(np.all([*off, bare]))

@@ -2,6 +2,7 @@
 """A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
 
 from dataclasses import dataclass, field, replace
+from glob import escape
 from pathlib import Path
 
 import numpy as np
@@ -67,13 +68,14 @@ def read_rigged_hair(path: str | Path, *, baked_first: bool = False, **options) 
 
     Args:
         path: USD file.
-        baked_first: if several skeletons have hair chains, take one that a bake moves, or the first; otherwise they are refused.
+        baked_first: whether a bake is wanted: its hair is what it moves, and of several skeletons with hair chains, the first that a bake
+            moves is taken, or the first; otherwise several are refused.
         options: see `read_rigged_hairs`, also for what it raises.
 
     Raises:
         NeuralocksError: there are several.
     """
-    found, _ = read_rigged_hairs(path, **options)
+    found, _ = read_rigged_hairs(path, as_baked=baked_first, **options)
     if baked_first:
         found.sort(key=lambda hair: not is_baked(hair.source))
         found = [replace(found[0], others=tuple(hair.source.path for hair in found[1:]))]
@@ -97,6 +99,7 @@ def read_rigged_hairs(
     all_shapes: bool = False,
     cuts: list[float] | None = None,
     unbaked: bool = False,
+    as_baked: bool = False,
     model: HairChains | None = None,
 ) -> tuple[list[RiggedHair], list[NeuralocksError]]:
     """Read the rigged mesh hair of a stage, and why other skeletons with joints that are named like hair cannot be used.
@@ -110,6 +113,7 @@ def read_rigged_hairs(
         all_shapes: keep blend shapes that the animation does not use (training draws random ones).
         cuts: as for `stage.read_shot`.
         unbaked: as for `read_rig`.
+        as_baked: of a rig bake, the chains that it moves, instead of finding them.
         model: a model's chains, whatever their names here; then nothing is guessed about which joints are hair.
 
     Raises:
@@ -136,7 +140,8 @@ def read_rigged_hairs(
             _check_authored(prim)
             source = read_rig(stage, prim, border, head, skins=skins, **given)
             with names_uneven_prims(source):
-                wanted = chains if model is None else _of_model(model, source.character)
+                wanted = chains or (of_bake(source) if as_baked else None)
+                wanted = wanted if model is None else _of_model(model, source.character)
                 rig = assemble_rig(source.character, core_meshes(source), wanted)
             if model is not None:  # otherwise it is checked for the chosen one
                 check_orients(source, rig.chains)
@@ -188,6 +193,14 @@ def _of_model(model: HairChains, character: Character) -> HairChains:
             "rig (neuralocks rig train)"
         )
     return placed_chains(chains, character)
+
+
+def of_bake(source: StageRig) -> list[str] | None:
+    """Patterns for the first joints of the chains that a rig bake moves; None if it is no bake, or one of a rig with other joints."""
+    hair, names = set(source.source.baked_hair), source.source.names
+    if not hair or not hair <= set(names):
+        return None
+    return [escape(name) for name in names if name in hair and not any(name.startswith(f"{above}/") for above in hair)]
 
 
 def is_baked(source: StageRig) -> bool:

@@ -10,6 +10,7 @@ from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import find_chains
 from neuralocks_core.rig.hair_names import says_face, says_hair, says_hair_alone
+from neuralocks_core.rig.measuring import placed_chains
 from neuralocks_core.rotation import from_vector
 from tests.core.rig.builders import character, skin, tail
 
@@ -53,6 +54,13 @@ def test_what_names_of_many_conventions_say():
     assert [name for name in hair.split() if not says_hair(name)] == []
     assert [name for name in other.split() if says_hair(name)] == []
     assert [name for name in other.split() if not says_face(name)] == ["bangle_1", "wiggle_2"]
+
+
+def test_hair_is_not_worn_because_its_name_begins_like_a_pin():
+    hair = "hair_tied_l_1 hair_pinned_R hair_tier1_2 hair_feathered_l hair_clipped_1 hair_pin_curl_L hair_ringlet_2 hair_bowl"
+    worn = "hair_pin_L hairpin_l_1 HairPinL hair_tie.001 HairClips_01 hair_band hairBow_R HAIRPIN hair_acc_2 HairAccessory_L"
+    assert [name for name in hair.split() if not says_hair(name)] == []
+    assert [name for name in worn.split() if says_hair(name) or not says_face(name)] == []
 
 
 def test_features_may_curl_and_lock():
@@ -110,6 +118,65 @@ def test_a_chain_of_controls_with_deforming_joints_beside_them_is_one_chain(patt
     assert chains.chain_length(0) == pytest.approx(3 * np.hypot(0.06, 0.01))
 
 
+@pytest.mark.parametrize("patterns", [None, ["off_1"], ["phys_1"]])
+@pytest.mark.parametrize("leaf_bones", [False, True])
+def test_a_chain_of_controls_goes_on_through_offsets_and_leaf_bones(patterns, leaf_bones):
+    """Hand-made rigs have an offset above each control, and FBX exporters an end joint below each deforming one."""
+    steered, skins = _steered("hair")
+    at = {
+        name.rpartition("/")[2]: tuple(bind[:3, 3]) for name, bind in zip(steered.skeleton.names, steered.skeleton.bind)
+    }
+    rows, above = [], "head"
+    for i in (1, 2, 3):
+        rows += [(f"off_{i}", above, at[f"phys_{i}"]), (f"phys_{i}", f"off_{i}", at[f"phys_{i}"])]
+        rows.append((f"hair_{i}", f"phys_{i}", at[f"hair_{i}"]))
+        if leaf_bones:
+            rows.append((f"hair_{i}_end", f"hair_{i}", tuple(np.add(at[f"hair_{i}"], (0.05, 0, 0)))))
+        above = f"phys_{i}"
+    who = character(rows)
+    chains = find_chains(who, [skin(who, skins)], patterns)
+    assert chains.names == ("phys_1", "phys_2", "phys_3") and list(chains.parents) == [-1, 0, 1]
+    assert chains.chain_length(0) == pytest.approx(3 * np.hypot(0.06, 0.01))
+    assert list(placed_chains(chains, who).parents) == [-1, 0, 1]
+
+
+@pytest.mark.parametrize("aside", [(0, 0, 0), (0, 0, -0.3), (0.1, 0, 0)])
+@pytest.mark.parametrize("what", ["socket", "pin"])
+def test_sockets_and_pins_on_a_chain_are_none_of_its_bones(what, aside):
+    """A joint without skin beside one with skin is no bone's end, and what is worn in hair rides on it."""
+    at = np.add((0, 1.54, -0.11), aside)
+    name = {"socket": "weapon_socket", "pin": "HairPin_L"}[what]
+    who = character([*tail("hair", 4), (name, "hair_2", tuple(at)), (f"{name}_end", name, tuple(at + [0, 0, 0.05]))])
+    skins = {f"hair_{i}": np.eye(3) * 0.02 + [0, 1.66 - 0.06 * i, -0.09 - 0.01 * i] for i in (1, 2, 3)}
+    if what == "pin":
+        skins[name] = np.eye(3) * 0.02 + at
+    chains = find_chains(who, [skin(who, skins)])
+    assert chains.names == ("hair_1", "hair_2", "hair_3")
+    np.testing.assert_allclose(np.linalg.norm(chains.bones, axis=1), np.hypot(0.06, 0.01), rtol=1e-6)
+
+
+def test_a_bone_without_length_is_told_with_the_joint_at_its_place():
+    rows = tail("hair", 4)
+    who = character([*rows, ("hair_b", "hair_2", rows[1][2]), ("hair_c", "hair_b", tuple(np.add(rows[1][2], 0.05)))])
+    points = np.eye(3) * 0.02
+    names = ("hair_1", "hair_2", "hair_3", "hair_b", "hair_c")
+    with pytest.raises(NeuralocksError, match="'hair_2' has no length \\('hair_b' lies at the same place"):
+        find_chains(who, [skin(who, dict.fromkeys(names, points))])
+
+
+@pytest.mark.parametrize("leaf_bones", [False, True])
+def test_end_joints_that_an_exporter_adds_make_no_hair_of_a_pipe(leaf_bones):
+    """An end joint shows that a joint of a strange name is a bone, unless all last joints have one."""
+    rows = [("pipe", "head", (0, 1.5, 0.1)), ("pipe_end", "pipe", (0, 1.5, 0.2))]
+    if leaf_bones:
+        rows += [(f"{s}_end", f"{s}_lower_arm", (0.6 if s == "left" else -0.6, 1.4, 0)) for s in ("left", "right")]
+    who = character([*rows, *tail("hair", 2)])
+    points = np.eye(3) * 0.1 + [0, 1.6, -0.1]
+    arms = dict.fromkeys(("chest", "left_lower_arm", "right_lower_arm"), points)
+    found = find_chains(who, [skin(who, {"pipe": points}), skin(who, {"hair_1": points}), skin(who, arms)]).names
+    assert found == (("hair_1",) if leaf_bones else ("pipe", "hair_1"))
+
+
 def test_a_holder_of_pieces_that_do_not_go_on_from_each_other_is_no_bone():
     """The next joint's children are not at its place: a group in a group."""
     who, skins = _steered("hair", next_leaf=False)
@@ -157,6 +224,13 @@ def test_a_joint_that_drives_the_cap_of_the_hair_is_no_bone():
     head = _ring(who, "head")
     assert find_chains(who, [head, tails, _ring(who, "Hair", 1.1)]).names == ("Hair_1", "Hair_2")
     assert find_chains(who, [head, tails, _ring(who, "Hair", 0.2)]).names == ("Hair", "Hair_1", "Hair_2")
+    beside = character([("Hair", "head", (0, 1.6, 0)), *tail("Hair", 3)])
+    cap = _ring(beside, "Hair", 1.1)
+    tails = skin(beside, {f"Hair_{i}": np.eye(3) * 0.1 + [0, 1.7 - 0.1 * i, -0.1] for i in (1, 2)})
+    assert find_chains(beside, [_ring(beside, "head"), tails, cap]).names == ("Hair_1", "Hair_2")
+    alone = character([("Hair", "head", (0, 1.6, 0))])
+    with pytest.raises(NeuralocksError, match="'Hair' drives all hair on the skull.*--chains Hair"):
+        find_chains(alone, [_ring(alone, "head"), _ring(alone, "Hair", 1.1)])
 
 
 @pytest.mark.parametrize("patterns", [None, ["hair_1"]])

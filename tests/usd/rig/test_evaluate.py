@@ -9,6 +9,7 @@ import trimesh
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
+from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
 from usd.rig.evaluate import evaluate_rig
 from usd.rig.stage import read_rigged_hair
@@ -222,3 +223,17 @@ def test_what_cannot_be_measured_is_one_line(tmp_path):
     stage.GetRootLayer().Save()
     with pytest.raises(NeuralocksError, match="/Who/Rig: no mesh is skinned to its hair joints; there is nothing"):
         evaluate_rig(shot)
+
+
+def test_the_hair_of_a_bake_is_what_it_moves(tmp_path):
+    """Without naming its chains again; also in pictures and in what is inspected."""
+    some, shot = ["hair_back*_1", "hair_nape*_1"], EXAMPLE / "shot.usda"
+    model = model_for(read_rigged_hair(shot, chains=some))
+    baked = bake_rig(shot, tmp_path / "baked.usda", model).path
+    card = evaluate_rig(baked)
+    assert str(card.measures) == str(evaluate_rig(baked, chains=some).measures)  # some are NaN
+    assert card.measures["joints"] == len(model.chains) < evaluate_rig(baked, chains=["hair_*_1"]).measures["joints"]
+    names = {name for name in model.chains.names if name.endswith("_1")}
+    (skeleton,) = inspect(baked)["skeletons"]
+    assert {row["name"] for row in skeleton["hair chains"]} == names
+    assert set(read_rigged_hair(baked, baked_first=True).rig.chains.names) == set(model.chains.names)

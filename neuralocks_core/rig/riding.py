@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which joints of a hair chain turn, and which only ride on those: deform joints, offsets, and what is worn in hair."""
+
+import numpy as np
+
+from neuralocks_core.character import Skeleton
+from neuralocks_core.rig.hair_names import says_face, says_hair
+from neuralocks_core.rig.skinned_mesh import SkinnedMesh
+
+NO_BONE = 1e-5
+"""Shorter bones [m] have no direction."""
+
+
+def in_chains(skeleton: Skeleton, tops: list[int], drives: np.ndarray) -> list[int]:
+    """The joints of these subtrees, without those that ride on them: deform joints, and what is worn in hair, which is stiff or has an
+    animation of its own.
+    """
+    names = skeleton.names
+    inside = np.any([skeleton.below(top) for top in tops], axis=0)
+    for top in tops:
+        for joint in np.flatnonzero(skeleton.below(top)):
+            ride = riders(skeleton, joint, drives)
+            if joint != top and says_face(names[joint]) and not says_hair(names[joint]) and not says_face(names[top]):
+                ride.append(joint)
+            for each in ride:
+                inside[skeleton.below(each)] = False
+    return np.flatnonzero(inside).tolist()
+
+
+def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
+    """Joints at a joint's own position that drive skin, with none further down, such as the deform joints of a control rig: they turn
+    with it.
+
+    Args:
+        skeleton: bind pose, in which positions are compared [m].
+        joint: index in the skeleton.
+        drives: which joints drive skin, (J,) bool.
+    """
+    places = skeleton.bind[:, :3, 3]
+    last = [child for child in skeleton.children[joint] if drives[child] and drives[skeleton.below(child)].sum() == 1]
+    return [child for child in last if np.linalg.norm(places[child] - places[joint]) < NO_BONE]
+
+
+def continued(skeleton: Skeleton, joint: int, drives: np.ndarray) -> int:
+    """The joint that a chain goes on with at this one's place: itself, or below offsets, which drive nothing, the one that turns.
+
+    Args:
+        skeleton, joint, drives: as for `riders`.
+    """
+    places = skeleton.bind[:, :3, 3]
+    while not drives[joint] and not riders(skeleton, joint, drives):
+        on = [child for child in skeleton.children[joint] if drives[skeleton.below(child)].any()]
+        if len(on) != 1 or np.linalg.norm(places[on[0]] - places[joint]) >= NO_BONE:
+            break
+        joint = on[0]
+    return joint
+
+
+def driving(skeleton: Skeleton, meshes: list[SkinnedMesh] | None) -> np.ndarray:
+    """Which joints (J,) bool drive skin of any mesh."""
+    drives = np.zeros(len(skeleton.names), bool)
+    for mesh in meshes or ():
+        drives |= mesh.driven_by(len(drives))
+    return drives
