@@ -74,12 +74,13 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         frames = frame_numbers(first, last, scene.neuralocks.subframes)
         settings = armature.neuralocks_character
         turns = bones.turns(frames / sampled.motion.rate, settings.rig_motion, wind=in_core(armature))
-        own = own_turns(sampled.own, sampled.motion, bones.joints, frames)
+        every = sampled.motion.frames
+        own = own_turns(sampled.own, sampled.motion, bones.joints, every)
         # Blender evaluates animation at stretched time.
-        stretched = frames * (scene.render.frame_map_old / scene.render.frame_map_new)
+        stretch = scene.render.frame_map_old / scene.render.frame_map_new
         settings.rig_live = False
         rest(armature)
-        action = actions.bake_keys(armature, bones.bones, stretched, turns, own)
+        action = actions.bake_keys(armature, bones.bones, (stretch * frames, turns), (stretch * every, own))
         return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
 
 

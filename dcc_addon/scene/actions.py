@@ -30,15 +30,15 @@ STILL = 1e-6
 """Rotations that change by less than this over time do not move."""
 
 
-def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.ndarray):
+def bake_keys(armature, bones, hair: tuple[np.ndarray, np.ndarray], own: tuple[np.ndarray, np.ndarray]):
     """Key the rotations of the hair bones and put them on a strip above all other animation, in place of an earlier bake. A strip
     below it holds what they did before, because Blender leaves a channel at its last value when its strip is muted.
 
     Args:
         armature: the armature object.
         bones: bone names, (N).
-        frames: (T,), as animation counts them.
-        turns, own: rotations (T, N, 4) wxyz with and without the hair's motion.
+        hair, own: frames (T,), as animation counts them, and rotations (T, N, 4) wxyz there, with and without the hair's motion.
+            Its own motion is wanted in all of the shot: muted, a bake of a part of it must not hold the bones still in the rest.
 
     Returns:
         the action of the hair's motion.
@@ -53,14 +53,12 @@ def bake_keys(armature, bones, frames: np.ndarray, turns: np.ndarray, own: np.nd
     before = rotations.kept(armature, bones)
     for name in bones:
         armature.pose.bones[name].rotation_mode = modes[name]
-    if frames[0] % 1:  # a strip begins at a whole frame
-        frames = np.concatenate([np.floor(frames[:1]), frames])
-        turns, own = (np.concatenate([each[:1], each]) for each in (turns, own))
-    needed = 1 if np.ptp(own, axis=0).max(initial=0.0) < STILL else len(frames)
+    frames, before_hair = own
+    needed = 1 if np.ptp(before_hair, axis=0).max(initial=0.0) < STILL else len(frames)
     ending = OVERRIDE if armature.override_library else ""
-    below = _action(armature, f"{armature.name} Before Hair", modes, frames[:needed], own[:needed])
+    below = _action(armature, f"{armature.name} Before Hair", modes, frames[:needed], before_hair[:needed])
     _strip(data, BEFORE + ending, below)
-    action = _action(armature, f"{armature.name} Hair", modes, frames, turns)
+    action = _action(armature, f"{armature.name} Hair", modes, *hair)
     action[KEPT], action[ALONE] = before, alone.keep_alone(data, HAIR)
     # If tracks are deleted by hand, the first bake knows the artist's own rotations.
     settings.keys_kept = rotations.joined(before, older[0])
@@ -264,6 +262,8 @@ def _strip(data, name: str, action) -> None:
 
 def _action(armature, label: str, modes: dict[str, str], frames: np.ndarray, turns: np.ndarray):
     """An action with keys (T, N, 4) at frames (T,) in the rotation mode of each bone."""
+    if frames[0] % 1:  # a strip begins at a whole frame
+        frames, turns = np.append(np.floor(frames[0]), frames), np.concatenate([turns[:1], turns])
     action = bpy.data.actions.new(label)
     curves = _curves(action, armature)
     for column, (name, mode) in enumerate(modes.items()):
