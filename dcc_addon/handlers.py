@@ -77,11 +77,14 @@ def on_update(scene, graph):
         session.wanting = session.wanting or bool(session.failed)
         session.failed.clear()
     moving = frozenset(names).union(*(session.rigs[name].moved_by for name in names & session.rigs.keys()))
-    if moving & objects.keys():
+    placed = {hair.name_full for hair in live_hairs(scene)} & {
+        u.id.name_full for u in graph.updates if u.is_updated_transform
+    }
+    if moving & objects.keys() or placed:
         background.doubt()
     elif any(isinstance(thing, bpy.types.Scene) for thing in changed):  # a body may be drawn or hidden
         background.doubt(closely=False)
-    if names & objects.keys() or any(_edited(o.original) for o in objects.values()):
+    if names & objects.keys() or placed or any(_edited(o.original) for o in objects.values()):
         live.update(scene, graph)
     _catch_up()
 

@@ -102,6 +102,19 @@ def kept_out_of(*bodies: str):
     assert session.rigs["Rig"].bodies == bodies and session.sampling is None
 
 
+def put_hair(height: float):
+    """The artist moves the hair object."""
+    bpy.data.objects["Hair"].location.z = height
+
+
+def sampled_at(height: float):
+    """The background has noticed that, although the frame has not changed."""
+    from dcc_addon.session import session
+
+    assert np.abs(session.rigs["Rig"].motion.places["Hair"][:, 2, 3] - height).max() < 1e-6
+    assert session.sampling is None
+
+
 def bake():
     """From the panel's operator, with progress."""
     window = bpy.context.window_manager.windows[0]
@@ -130,6 +143,7 @@ def _idle():
 STEPS = [build, _idle, mouse, lambda: mouse(click=True), _idle, lambda: mouse(TAB), lambda: mouse(click=True), _idle,
          lambda: mouse(LIVE), lambda: mouse(click=True), _idle, picture, is_live, sampled, scrub,
          lambda: draw_body(False), lambda: kept_out_of(), lambda: draw_body(True), lambda: kept_out_of("Body"),
+         lambda: put_hair(0.02), lambda: sampled_at(0.02), lambda: put_hair(0.0), lambda: sampled_at(0.0),
          bake, baked, picture]  # fmt: skip
 
 
