@@ -114,6 +114,7 @@ class BoundHair:
         return [
             *self._renamed(),
             *self._resized(),
+            *self._read_otherwise(),
             *rigged_notes(rig, read),
             *_name_notes(rig.source),
             *([outdated_note(rig.source, self.outdated)] if self.outdated else []),
@@ -150,6 +151,19 @@ class BoundHair:
         if here == self.trained_name:
             return []
         return [f"model: its joints have other names here, '{here}' for '{self.trained_name}'"]
+
+    def _read_otherwise(self) -> list[str]:
+        """The notes on joints that this rig has as the model's has them, but that others are read in place of."""
+        source, reads = self.hair.source, self.model.training.get("reads")
+        names, notes = [leaf(name) for name in source.source.names], []
+        for name in self.model.spec.pose_joints if isinstance(reads, dict) else ():
+            now, trained = names[source.character.humanoid.nearest(name)], reads.get(name)
+            if trained != now and trained in names:
+                notes.append(
+                    f"{source.path}: '{now}' is read as {name}, but in training '{trained}' was, which is here, too; check "
+                    f"--joint {name}={trained}"
+                )
+        return notes
 
     def _resized(self) -> list[str]:
         """The note on a character of another size than the model's."""

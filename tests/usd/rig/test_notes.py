@@ -15,7 +15,7 @@ from usd.rig.bake import bake_rig
 from usd.rig.notes import rigged_notes
 from usd.rig.stage import check_patterns, read_rigged_hair
 
-from ..rig_shots import model_for, small_shot
+from ..rig_shots import EXAMPLE, model_for, small_shot
 
 
 def _retyped(name: str, kind, value):
@@ -197,3 +197,14 @@ def test_a_joint_that_a_scale_of_zero_hides_for_some_frames_is_named(edited, tmp
     assert re.search(said, "\n".join(inspect(path)["stops"]))
     path = edited(lambda stage: hide(stage, 4))
     assert bake_rig(path, tmp_path / "out.usda", model).rigs[0].samples and not inspect(path)["stops"]
+
+
+@pytest.mark.parametrize(("joints", "told"), [({}, 0), ({"upper_chest": "spine_01"}, 1)])
+def test_another_joint_in_place_of_the_one_that_a_model_read_is_told(tmp_path, joints, told):
+    """The shipped model was trained for this rig, in which both are."""
+    result = bake_rig(EXAMPLE / "shot.usda", tmp_path / "baked.usda", joints=joints, frames="1:3")
+    said = [note for note in result.notes if "is read as" in note]
+    assert len(said) == told
+    if told:
+        assert "'spine_01' is read as upper_chest, but in training 'spine_03' was" in said[0]
+        assert said[0].endswith("check --joint upper_chest=spine_03")
