@@ -28,8 +28,8 @@ def in_chains(skeleton: Skeleton, tops: list[int], drives: np.ndarray) -> list[i
 
 
 def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
-    """Joints at a joint's own position that drive skin, with none further down, such as the deform joints of a control rig: they turn
-    with it.
+    """Joints that drive skin, with none further down, and lie at a joint's own position, such as the deform joints of a control rig, or
+    on its bone, such as twist joints: they turn with it.
 
     Args:
         skeleton: bind pose, in which positions are compared [m].
@@ -37,8 +37,16 @@ def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
         drives: which joints drive skin, (J,) bool.
     """
     places = skeleton.bind[:, :3, 3]
-    last = [child for child in skeleton.children[joint] if drives[child] and drives[skeleton.below(child)].sum() == 1]
-    return [child for child in last if np.linalg.norm(places[child] - places[joint]) < NO_BONE]
+    skins = {child: int(drives[skeleton.below(child)].sum()) for child in skeleton.children[joint]}
+    bones = {child: places[child] - places[joint] for child, count in skins.items() if count}
+    last = [child for child in bones if drives[child] and skins[child] == 1]
+    return [child for child in last if _lies_on(bones[child], [bones[c] for c in bones if c != child])]
+
+
+def _lies_on(place: np.ndarray, bones: list[np.ndarray]) -> bool:
+    """Whether a place (3,) is where bones (3,) begin, or on one of them."""
+    shares = [np.clip(place @ bone / max(bone @ bone, NO_BONE**2), 0, 1) for bone in bones]
+    return min([np.linalg.norm(place)] + [np.linalg.norm(place - s * b) for s, b in zip(shares, bones)]) < NO_BONE
 
 
 def continued(skeleton: Skeleton, joint: int, drives: np.ndarray) -> int:

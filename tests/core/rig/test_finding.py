@@ -140,6 +140,19 @@ def test_a_chain_of_controls_goes_on_through_offsets_and_leaf_bones(patterns, le
     assert list(placed_chains(chains, who).parents) == [-1, 0, 1]
 
 
+@pytest.mark.parametrize("share", [0.25, 0.5])
+def test_twist_joints_ride_on_the_bone_that_they_lie_on(share):
+    """Turned by themselves, they would tear the skin off the next joint."""
+    rows = tail("hair", 4)
+    at = [np.array(place) for _, _, place in rows]
+    twists = [(f"hair_{i + 1}_twist", f"hair_{i + 1}", tuple(at[i] + share * (at[i + 1] - at[i]))) for i in (0, 1)]
+    beside = ("hair_side", "hair_2", tuple(at[1] + [0.001, -0.02, 0]))
+    who = character([*rows, *twists, beside, ("hair_side_end", "hair_side", tuple(at[1] + [0.02, -0.06, 0]))])
+    names = ("hair_1", "hair_2", "hair_3", "hair_1_twist", "hair_2_twist", "hair_side")
+    skins = {name: np.eye(3) * 0.02 + [0, 1.5, -0.1] for name in names}
+    assert find_chains(who, [skin(who, skins)]).names == ("hair_1", "hair_2", "hair_3", "hair_side")
+
+
 @pytest.mark.parametrize("aside", [(0, 0, 0), (0, 0, -0.3), (0.1, 0, 0)])
 @pytest.mark.parametrize("what", ["socket", "pin"])
 def test_sockets_and_pins_on_a_chain_are_none_of_its_bones(what, aside):
