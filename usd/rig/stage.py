@@ -218,14 +218,15 @@ def core_meshes(source: StageRig) -> list[SkinnedMesh]:
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:
-    """Refuse a pattern of `--chains` that matches none of the chains found.
+    """Refuse a pattern of `--chains` that matches none of the joints found, nor an offset that carries some.
 
     Raises:
         NeuralocksError: names it.
     """
-    joints = [hair.source.source.names[j] for j in hair.rig.chains.joints]
+    character, joints = hair.source.character, hair.rig.chains.joints
+    above = [j for j in np.flatnonzero(character.of_head) if character.skeleton.below(j)[joints].any()]
     for pattern in patterns or ():
-        if not any(fits(name, pattern) for name in joints):
+        if not any(fits(hair.source.source.names[joint], pattern) for joint in above):
             raise NeuralocksError(
                 f"--chains {pattern}: no joint of the hair has such a name; see neuralocks inspect for their names"
             )
