@@ -24,8 +24,7 @@ from neuralocks_core.wind import Wind
 STEP = 1 / 30
 """Time step of the reference [s]: the one that models are trained on."""
 CROWDED_STEPS = 2
-"""Substeps of a step with a volume term, whose force is updated between Newton solves only: twice as many leave a quarter of the
-time step's error, for half as much time again."""
+"""Substeps of a step with a volume term: its force is updated between Newton solves only, so that whole steps are less exact."""
 RUN_IN = 10.0
 """Time [s] after which earlier motion has died away: a loop's hair, simulated from rest for this long, ends a period where it
 began, except for millimetres in a few strands that creep over skin."""
