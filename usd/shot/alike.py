@@ -8,7 +8,8 @@ from neuralocks_core.anatomy.joint_names import words
 from neuralocks_core.errors import NeuralocksError
 
 from ..skel.stage_rig import StageRig
-from .seat import CLEARLY, Seat, kinship
+from .seat import Seat, kinship
+from .ways import CLEARLY
 
 SAME = 0.01
 """Joints of two skeletons at most this far apart [m] are one."""

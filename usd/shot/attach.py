@@ -22,8 +22,9 @@ from .alike import one_of_alike
 from .carrying import carried_by, carrying_joint, followed_joint, head_by_name, joint_shares, spread_over
 from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
-from .seat import CLEARLY, NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure, ways
+from .seat import NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure
 from .seat_notes import astray, lies_off_skin, not_pinned, upside_down
+from .ways import CLEARLY, ways
 
 ON_HEAD = 0.3
 """Roots within this distance of a head [m], and within half the length of the trunk, are on it, whatever else is there."""

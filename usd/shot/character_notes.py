@@ -21,7 +21,7 @@ from ..skel.binding import bound_skeleton
 from ..skel.stage_rig import StageRig
 from ..skel.surface import drawn
 from .notes import unlikely_head
-from .seat import beginnings
+from .ways import beginnings
 from .whole_body import parts_elsewhere
 
 AROUND = 0.25

@@ -14,7 +14,8 @@ from ..border.values import as_numbers
 from ..skel.binding import rest_value
 from ..skel.stage_rig import StageRig
 from .attach import REACH
-from .seat import NEAR, ways
+from .seat import NEAR
+from .ways import ways
 
 MOST = 200
 """Most prims that are looked at: a rig may have thousands of such curves as controls."""

@@ -6,7 +6,6 @@ at one moment. For curves that move with the head or are a moving cache it is a 
 their roots on skin.
 """
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -22,25 +21,22 @@ from ..skel.skin import Skin
 from ..skel.stage_rig import StageRig
 from ..skel.surface import StageMesh
 from .curve_ends import Beyond, beyond_ends, ends
-from .curves import lone_sample, moment, rest_points
+from .curves import moment, rest_points
+from .ways import CLEARLY, SOME_TIMES, STEADY, drifts_of, rest_way, ways
 
 NEAR = 0.03
 """Roots this far from a mesh, in the median, still sit on it [m]."""
-CLEARLY = 2
-"""Hair must be this many times nearer to skin by a less likely way than by a likelier one for the former to count: hair that hovers
-over skin may come a little nearer by a wrong way, such as one that counts a parent's scale twice.
-"""
-SURELY = ((3e-3, 4), (1e-3, 12))
-"""Roots that a likely way puts near skin, but the former [m] or more from its faces in the median, are taken by another way if that
-brings them this many times nearer to faces."""
-SOME_ROOTS, SOME_TIMES = 1000, 16
-"""About how many of a groom's roots and of a prim's samples are looked at: all would be too many."""
+UNEVEN, SURELY = 1e-3, 5
+"""Roots that a likely way puts near skin, but UNEVEN [m] or more `_off_faces`, are taken by another way if they are SURELY times less
+so by it."""
+HOVER = 0.1
+"""How much the same distance of all roots from the skin counts, beside how much the distances differ."""
+ON_FACES = 5e-3
+"""Hair that is on no skin otherwise was made in the rest pose if its roots are no farther than this from faces there, in the median [m],
+and all alike."""
+SOME_ROOTS = 1000
+"""About how many of a groom's roots are looked at: all would be too many."""
 
-STEADY = 1e-4
-"""A prim that drifts no more than this relative to something is moved by it."""
-ABOUT, ROUNDED = 10.0, 0.01
-"""A drift is a share of the prim's distance from the origin, but of at most ABOUT metres or, since far positions are rounded, of
-ROUNDED times that distance."""
 APART = 5e-3
 """Places of a groom this far from each other [m] look different."""
 
@@ -105,7 +101,7 @@ def _find_seat(
     roots: np.ndarray, when: float | None, rig: StageRig, placement: Placement, within: float
 ) -> Seat | None:
     best = None
-    drifts = None if when is not None or not rig.meshes else _drifts(rig, placement)  # the same for all meshes
+    drifts = None if when is not None or not rig.meshes else drifts_of(rig, placement)  # the same for all meshes
 
     def nearest(best: Seat | None, mesh, skin, way: tuple[bool, int], to_bind) -> Seat | None:
         placed = transformed(roots, to_bind)
@@ -122,78 +118,54 @@ def _find_seat(
         for mesh, skin in zip(rig.meshes, rig.skins, strict=True):
             for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely, drifts=drifts)):
                 best = nearest(best, mesh, skin, (not likely, place), to_bind)
+    at_rest = rest_way(rig, placement, when, drifts) if rig.meshes else None
     if best is not None and best.distance <= NEAR:
-        return _on_faces(best, roots, when, placement, drifts) or best
+        others = ways(rig, best.mesh, placement, when, likely=False, drifts=drifts)
+        return _on_faces(best, roots, [*others, *([] if at_rest is None else [at_rest])]) or best
+    if at_rest is not None and (seat := _on_skin_at_rest(rig, roots, at_rest)) is not None:
+        return seat
     return best if best is not None and best.distance <= within else None
 
 
-def _on_faces(seat: Seat, roots: np.ndarray, when: float | None, placement: Placement, drifts) -> Seat | None:
-    """The seat by an unlikely way that puts roots right onto the skin, near which they only are by the given one; None if there is
-    none. A head that turns by a few degrees before the shot begins leaves hair near its skin, but moved along it by centimetres.
+def _on_faces(seat: Seat, roots: np.ndarray, others: list[np.ndarray]) -> Seat | None:
+    """The seat by another way that puts roots right onto the skin, near which they only are by the given one; None if there is none.
+    A head that turns by a few degrees before the shot begins leaves hair near its skin, but moved along it by centimetres.
     """
     near = []
-    for place, to_bind in enumerate(ways(seat.rig, seat.mesh, placement, when, likely=False, drifts=drifts)):
+    for place, to_bind in enumerate(others):
         placed = transformed(roots, to_bind)
-        middle = float(np.median(seat.skin.query(placed, seat.distance)[0]))
+        middle = float(np.median(seat.skin.query(placed, NEAR)[0]))
         if np.isfinite(middle):
             near.append(replace(seat, distance=middle, to_bind=to_bind, way=(True, place), roots=placed))
-    if not near or (surface := seat.rig.surface) is None or (off := _median_off(surface, seat.roots)) < SURELY[-1][0]:
+    if not near or (surface := seat.rig.surface) is None or (off := _off_faces(surface, seat.roots)) < UNEVEN:
         return None
-    best = min(near, key=lambda each: _median_off(surface, each.roots))
-    left = _median_off(surface, best.roots)
-    return best if any(off >= max(least, times * left) for least, times in SURELY) else None
+    best = min(near, key=lambda each: _off_faces(surface, each.roots))
+    return best if off >= SURELY * _off_faces(surface, best.roots) else None
 
 
-def _median_off(surface: Collider, points: np.ndarray) -> float:
-    """Median distance of points (n, 3) from faces, on either side [m]."""
-    return float(np.median(np.abs(surface.distance(points)[0])))
+def _on_skin_at_rest(rig: StageRig, roots: np.ndarray, at_rest: np.ndarray) -> Seat | None:
+    """The seat of hair that was made in the rest pose, right on the skin that is nearest there; None if it is not."""
+    placed = transformed(roots, at_rest)
+    far = [float(np.median(skin.query(placed, NEAR)[0])) for skin in rig.skins]
+    nearest = int(np.argmin(far))
+    if not far[nearest] <= NEAR or rig.surface is None:
+        return None
+    off = np.abs(rig.surface.distance(placed)[0])
+    if np.median(off) > ON_FACES or _off_faces(rig.surface, placed) > UNEVEN:
+        return None
+    return Seat(far[nearest], rig, rig.meshes[nearest], at_rest, (True, 0), placed, rig.skins[nearest])
 
 
-def ways(
-    rig: StageRig,
-    mesh: StageMesh | None,
-    placement: Placement,
-    when: float | None = None,
-    *,
-    likely: bool = True,
-    drifts: tuple[float, float] | None = None,
-) -> list[np.ndarray]:
-    """Candidates (4, 4) for the way from the groom's own space to bind world, the likeliest first.
-
-    Args:
-        rig: what carries the groom.
-        mesh: its skin below the groom, if it has one.
-        placement: where the groom's prim stands.
-        when: time code at which the groom has the points it is read with, if they are not points at rest.
-        likely: those that serve unless skin says otherwise, or the others.
-        drifts: the result of `_drifts`, if it is known already.
-    """
-    groom = placement.reference
-    still = []
-    if mesh is not None and mesh.placement.usable:
-        still.append(rig.to_bind @ mesh.geom_bind @ np.linalg.inv(mesh.placement.reference) @ groom)
-    still += [rig.to_bind @ np.linalg.inv(rig.source.placement.reference) @ groom, rig.to_bind @ groom]
-    if placement.brought is not None:  # another file's groom knows nothing of where the character's file puts it
-        still.append(rig.border.to_core @ groom)
-    if not rig.source.animated:
-        return still if likely else []
-    if when is not None:  # it is seen where it is then
-        return [_posed(rig, placement, when)] if likely else still
-    with_skeleton, with_head = drifts or _drifts(rig, placement)
-    if with_skeleton <= STEADY:
-        return still if likely else _elsewhere(rig, placement)
-    # A prim that is moved along by its parents: where it stood relative to the head when that motion began.
-    posed = [_posed(rig, placement, placement.samples[0])]
-    if with_head <= STEADY:
-        return posed if likely else still
-    # A set carries along what stands and walks in it; only what nearly keeps to the head was made on it.
-    both = posed + still if CLEARLY * with_head < with_skeleton else still + posed
-    return both if likely else []
+def _off_faces(surface: Collider, points: np.ndarray) -> float:
+    """How far points (n, 3) are from lying on faces, or all at one distance from them, as hair that hovers does [m]."""
+    signed = surface.distance(points)[0]
+    middle = np.median(signed)
+    return float(np.median(np.abs(signed - middle)) + HOVER * abs(middle))
 
 
 def unsure(prim: Usd.Prim, seat: Seat, placement: Placement) -> list[str]:
     """The note on a groom that moves with neither skeleton nor head, if another of its likely places is on the skin, too."""
-    drifts = _drifts(seat.rig, placement)
+    drifts = drifts_of(seat.rig, placement)
     if moment(prim) is not None or min(drifts) <= STEADY:
         return []
     back = np.linalg.inv(seat.to_bind)
@@ -206,22 +178,6 @@ def unsure(prim: Usd.Prim, seat: Seat, placement: Placement) -> list[str]:
         f"{prim.GetPath()}: its motion is neither that of {seat.rig.path} nor of the head, so its place at rest is a guess, "
         f"maybe wrong by {1000 * apart:.2g} mm; bind it to the skeleton"
     ]
-
-
-def _elsewhere(rig: StageRig, placement: Placement) -> list[np.ndarray]:
-    """Ways of hair that stands still, made on a head that is not in the bind pose: when its exporter wrote it, when the motion or
-    the shot begins, or in the rest pose, which USD shows of a character without its animation.
-    """
-    codes = dict.fromkeys([*lone_sample(placement.prim), *placement.lone_samples, *beginnings(rig)])
-    at_rest = np.linalg.inv(rig.carrying_at_rest) @ rig.border.to_core @ placement.reference
-    return [*(_posed(rig, placement, code) for code in codes), at_rest]
-
-
-def beginnings(rig: StageRig) -> list[float]:
-    """Time codes at which the motion begins, and the shot begins, if that is after a run-up."""
-    (first, last), stage = rig.time_codes[[0, -1]].tolist(), rig.source.prim.GetStage()
-    start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else first
-    return [first, start] if first < start <= last else [first]
 
 
 def kinship(prim: Usd.Prim, skeleton: Usd.Prim) -> int:
@@ -243,26 +199,6 @@ def some_ends(prim: Usd.Prim, *, last: bool = False, beyond: Beyond | None = Non
     return found
 
 
-def _posed(rig: StageRig, placement: Placement, when: float) -> np.ndarray:
-    """The way of a groom that lies right on the head as it is at a time code."""
-    return np.linalg.inv(rig.carrying_at(when)) @ rig.border.to_core @ placement.at(when)
-
-
-def _drifts(rig: StageRig, placement: Placement) -> tuple[float, float]:
-    """How much a prim moves relative to a skeleton, and to its head; (0, 0) if either stands still, infinity for the head if the
-    skeleton's place moves the prim.
-    """
-    if not placement.samples or not rig.source.animated:
-        return 0.0, 0.0
-    about = ABOUT / rig.border.metres_per_unit
-    with_skeleton = _drift(placement, rig.source.placement.at, about)
-    if with_skeleton <= STEADY:
-        return with_skeleton, np.inf
-    return with_skeleton, _drift(
-        placement, lambda time: rig.border.from_core @ rig.carrying_at(time) @ rig.border.to_core, about
-    )
-
-
 def some_places(rig: StageRig, placement: Placement) -> tuple[np.ndarray, np.ndarray]:
     """Some samples of a rig's clip (n,), and where a prim stands at each (n, 4, 4) [m]; without those at which it cannot be placed,
     for example because it is flat: a bake reports them when it gets there.
@@ -273,16 +209,3 @@ def some_places(rig: StageRig, placement: Placement) -> tuple[np.ndarray, np.nda
             places.append(rig.border.to_core @ placement.at(rig.time_codes[row]))
             rows.append(row)
     return np.array(rows, int), np.array(places).reshape(-1, 4, 4)
-
-
-def _drift(placement: Placement, against: Callable[[float], np.ndarray], about: float) -> float:
-    """How much a moving prim moves relative to something else in stage space, as a share: 0 if that is what moves it; `about` is
-    ABOUT in units of the stage.
-    """
-    times = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)]
-    places = np.stack([placement.at(time) for time in times])
-    relative = np.linalg.inv(np.stack([against(time) for time in times])) @ places
-    turned, moved = (np.abs(relative - relative[0])[..., part].max() for part in (slice(3), 3))
-    far = np.abs(places[..., 3]).max()
-    reach = max(1.0, min(far, about), ROUNDED * far, np.abs(relative[..., 3]).max())
-    return float(max(turned / np.abs(relative[0, :3, :3]).max(), moved / reach))

@@ -11,7 +11,8 @@ from neuralocks_core.rotation import inverse, sizes, transformed
 from ..border.placement import Placement
 from ..skel.stage_rig import StageRig
 from .curve_ends import Beyond
-from .seat import CLEARLY, NEAR, either_ends, find_seat, off_skin, some_ends, some_places
+from .seat import NEAR, either_ends, find_seat, off_skin, some_ends, some_places
+from .ways import CLEARLY
 
 REVERSED = "seem to run from tip to root"
 """What the note on such strands says."""

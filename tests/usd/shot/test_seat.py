@@ -9,7 +9,7 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.border.placement import Placement
 from usd.review.baked import read_baked
-from usd.shot import seat
+from usd.shot import ways
 from usd.shot.seat import NEAR, find_seat
 from usd.shot.stage import read_rigs, read_shot
 from usd.skel import skin, surface
@@ -160,9 +160,11 @@ def test_hair_made_where_the_character_stands_first_and_hair_off_the_skin(tmp_pa
     assert 0.1 < float(said.split(" m from")[0].split()[-1]) < 0.3
 
 
-@pytest.mark.parametrize("off", [0.0, 0.005])
+@pytest.mark.parametrize("off", [0.0, 0.002, 0.005, None])
 def test_hair_made_near_its_place_in_the_bind_pose_lies_where_it_is_on_the_skin(tmp_path, off):
-    """If the head has moved by less than the distance within which hair sits on it; but not where it touches neither."""
+    """If the head has moved by less than the distance within which hair sits on it, also where hair hovers; but not where roots lie on
+    the skin in neither place.
+    """
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
     motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
@@ -174,11 +176,12 @@ def test_hair_made_near_its_place_in_the_bind_pose_lies_where_it_is_on_the_skin(
         motion.GetTranslationsAttr().Set(Vt.Vec3fArray.FromNumpy(moved.astype(np.float32)), code)
     points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
     rest = np.asarray(points.Get())
-    made = CENTRE + (rest - CENTRE) * (1 + off / 0.1)
+    ragged = np.random.default_rng(3).uniform(-0.02, 0.03, (40, 1)).repeat(12, axis=0)
+    made = CENTRE + (rest - CENTRE) * (1 + (ragged if off is None else off) / 0.1)
     points.Set(Vt.Vec3fArray.FromNumpy((made + way).astype(np.float32)))
     stage.Save()
     (item,) = read_shot(path).grooms
-    np.testing.assert_allclose(item.groom.points, made + way * bool(off), atol=1e-6)
+    np.testing.assert_allclose(item.groom.points, made + way * (off is None), atol=1e-6)
 
 
 @pytest.mark.parametrize("bound", ["mesh", "none"])
@@ -226,10 +229,11 @@ def test_hair_that_was_written_at_one_frame_lies_where_it_is_seen_then(tmp_path,
     np.testing.assert_allclose(item.groom.points, rest, atol=1e-6)
 
 
-@pytest.mark.parametrize("degrees", [4, 20, 90])
-def test_hair_made_on_a_character_in_its_rest_pose_is_on_the_head(tmp_path, degrees):
+@pytest.mark.parametrize("frames", [9, 0], ids=["animated", "still"])
+@pytest.mark.parametrize(("degrees", "hovers"), [(4, 0.0), (20, 0.0), (90, 0.0), (20, 0.002)])
+def test_hair_made_on_a_character_in_its_rest_pose_is_on_the_head(tmp_path, degrees, hovers, frames):
     """Without its animation, USD shows a character in that pose, which need not be the bind pose."""
-    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    path = write_shot(tmp_path, Recipe(bound="mesh", frames=frames))
     stage = Usd.Stage.Open(str(path))
     rests = UsdSkel.Skeleton(stage.GetPrimAtPath("/Hero/Rig")).GetRestTransformsAttr()
     bent = np.array(rests.Get())
@@ -238,13 +242,32 @@ def test_hair_made_on_a_character_in_its_rest_pose_is_on_the_head(tmp_path, degr
     bent[1, :3, :3] = bent[1, :3, :3] @ turn
     rests.Set(Vt.Matrix4dArray.FromNumpy(bent))
     points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
-    rest = np.asarray(points.Get())
+    rest = CENTRE + (np.asarray(points.Get()) - CENTRE) * (1 + hovers / 0.1)
     stage.Save()
     (rig,) = read_rigs(path)
     points.Set(_rigid(rest, rig.carrying_at_rest))
     assert np.abs(np.asarray(points.Get()) - rest).max() > 0.02
     stage.Save()
-    np.testing.assert_allclose(read_shot(path).grooms[0].groom.points, rest, atol=2e-6)
+    np.testing.assert_allclose(read_shot(path, still=True).grooms[0].groom.points, rest, atol=2e-6)
+
+
+@pytest.mark.parametrize("degrees", [10, 20, -15])
+def test_hair_that_begins_off_the_skin_is_not_taken_from_another_rest_pose(tmp_path, degrees):
+    """A ponytail that is tied behind the head, of a character whose rest pose is another: a note says that it is off."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    rests = UsdSkel.Skeleton(stage.GetPrimAtPath("/Hero/Rig")).GetRestTransformsAttr()
+    bent, angle = np.array(rests.Get()), np.radians(degrees)
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), np.sin(angle)], [0, -np.sin(angle), np.cos(angle)]])
+    bent[2, :3, :3] = bent[2, :3, :3] @ turn
+    rests.Set(Vt.Matrix4dArray.FromNumpy(bent))
+    tied = CENTRE + [0, 0.03, -0.15] + np.random.default_rng(0).uniform(-0.01, 0.01, (40, 1, 3))
+    hair = (tied + np.linspace(0, 0.3, 12)[:, None] * [0, 0, -1]).reshape(-1, 3).astype(np.float32)
+    UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(hair))
+    stage.Save()
+    shot = read_shot(path)
+    np.testing.assert_allclose(shot.grooms[0].groom.points, hair, atol=1e-6)
+    assert any("from the skin" in note for note in shot.notes), shot.notes
 
 
 @pytest.mark.parametrize("lifted", [0.0, 0.4], ids=["some_roots_far", "most_roots_far"])
@@ -317,8 +340,8 @@ def test_a_moving_prims_motion_is_measured_alike_often_for_few_and_many_meshes(t
     op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddTransformOp()
     for code in range(START, 10):
         op.Set(Gf.Matrix4d((0.5 * (head[code] + np.eye(4))).T.tolist()), code)
-    asked, drift = [], seat._drift
-    monkeypatch.setattr(seat, "_drift", lambda *given: asked.append(given) or drift(*given))
+    asked, drift = [], ways._drift
+    monkeypatch.setattr(ways, "_drift", lambda *given: asked.append(given) or drift(*given))
     counts = []
     for number in range(2):
         stage.Save()
