@@ -47,7 +47,7 @@ def find_chains(
     tops = _by_pattern(character, patterns) if patterns else _by_itself(character, meshes)
     if not tops:
         raise _no_chains(character, meshes)
-    return measured_chains(character, sorted(tops), meshes)
+    return measured_chains(character, sorted(tops), meshes, _matching(character, patterns or []))
 
 
 def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHairChains:
@@ -127,10 +127,14 @@ def fits(name: str, pattern: str) -> bool:
     return fnmatch.fnmatchcase(name, pattern) or fnmatch.fnmatchcase(leaf(name), pattern)
 
 
+def _matching(character: Character, patterns: list[str]) -> list[int]:
+    return [j for j, name in enumerate(character.skeleton.names) if any(fits(name, each) for each in patterns)]
+
+
 def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
     """First joints of the subtrees whose first joint matches."""
     names, parents = character.skeleton.names, character.skeleton.parents
-    hits = [joint for joint, name in enumerate(names) if any(fits(name, pattern) for pattern in patterns)]
+    hits = _matching(character, patterns)
     if not hits:
         raise NoHairChains(
             f"--chains {' '.join(patterns)}: no joint has such a name; see neuralocks inspect for their names"

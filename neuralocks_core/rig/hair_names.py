@@ -18,9 +18,9 @@ _FACE = (
     "|pupil|iris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
     "|whisker|mo?ustache|bunny|neko"
     "|fang|choker|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
-    "|antenna|antler|feather|flower|wreath|pendant|necklace|locket|piercing|jewel|ornament|accessor"
-    "|(?:bow|pin|clip|cap|hood|veil|mask|halo|bell|gem|wing|mic)s?$"
+    "|antenna|antler|necklace|locket|piercing|(?:cap|hood|veil|mask|halo|wing|mic)s?$"
 )
+_ORNAMENTS = "feather|flower|wreath|pendant|jewel|ornament|accessor|scrunch|barrette|(?:bow|pin|clip|bell|gem)s?$"
 _HAIR_ANYWHERE = re.compile(
     "(?<!c)hair|pigtail|twintail|sidetail|(?:mae|ushiro|yoko)gami"
     "|髪|アホ毛|アホゲ|おさげ|ツインテ|ポニテ|もみあげ|テール|三つ編み|みつあみ|ちょんまげ|触角"
@@ -66,7 +66,12 @@ def says_hair_alone(name: str) -> bool:
 def says_face(name: str) -> bool:
     """Whether a joint's path or name means a part of the face, or what a head wears."""
     whole = _whole(name)
-    return bool(_begins(name, _FACE) or _FACE_ANYWHERE.search(whole) or _worn_in_hair(name))
+    return bool(_begins(name, f"{_FACE}|{_ORNAMENTS}") or _FACE_ANYWHERE.search(whole) or _worn_in_hair(name))
+
+
+def says_worn(name: str) -> bool:
+    """Whether a joint's path or name means what is worn in hair."""
+    return _worn_in_hair(name) or not says_hair(name) and bool(_begins(name, _ORNAMENTS))
 
 
 def _no_hair(name: str) -> bool:

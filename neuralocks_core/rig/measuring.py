@@ -30,13 +30,16 @@ class UnevenJoint(NeuralocksError):
     """A hair joint is scaled more along one axis than along another."""
 
 
-def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedMesh] | None) -> HairChains:
+def measured_chains(
+    character: Character, tops: list[int], meshes: list[SkinnedMesh] | None, named: list[int] = ()
+) -> HairChains:
     """The chains that begin at these joints.
 
     Args:
         character: whose skeleton they are in.
         tops: first joints of the subtrees, ascending.
         meshes: the skinned meshes, which tell where free ends are.
+        named: joints that somebody named; see `in_chains`.
 
     Raises:
         NeuralocksError: no joint moves, a bone has no length, two hair joints share a name, a chain's first joint has the
@@ -44,7 +47,7 @@ def measured_chains(character: Character, tops: list[int], meshes: list[SkinnedM
     """
     skeleton = character.skeleton
     places = character.canonical(skeleton.bind[:, :3, 3])
-    rows, free, ends = _moving(character, tops, meshes, places)
+    rows, free, ends = _moving(character, tops, meshes, named, places)
     if not rows:
         raise NeuralocksError(
             f"skeleton: hair joint '{leaf(skeleton.names[tops[0]])}' drives no vertices and has no child; "
@@ -118,13 +121,15 @@ def _origins_and_axes(character: Character, joints: np.ndarray) -> tuple[np.ndar
     return character.canonical(bind[:, :3, 3]), axes
 
 
-def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -> tuple[dict, dict, dict]:
+def _moving(
+    character: Character, tops: list[int], meshes, named: list[int], places: np.ndarray
+) -> tuple[dict, dict, dict]:
     """Three dicts of the joints that move: their row among the hair joints; the free end of their bone (3,) [m], if they have one;
     and the joints at the other ends of their bones.
     """
     skeleton = character.skeleton
     drives = driving(skeleton, meshes)
-    order = in_chains(skeleton, tops, drives)
+    order = in_chains(skeleton, tops, drives, named)
     carries = _carrying(skeleton, order, drives)
     rows, free, ends = {}, {}, {}
     for joint in order:
@@ -134,6 +139,8 @@ def _moving(character: Character, tops: list[int], meshes, places: np.ndarray) -
         beyond = [child for child in skeleton.children[joint] if child in order]
         # What has no skin beside what has some is a socket or a pole, and not where the bone ends.
         beyond = [child for child in beyond if child in carries] or beyond
+        if len(beyond) > 1 and not carries.intersection(beyond):
+            beyond = _ahead(skeleton, joint, beyond, places)
         own, only_markers = [joint, *riding], joint in carries and not carries.intersection(beyond)
         end = None
         if not beyond or only_markers and _astray(character, own, beyond, joint in tops, meshes, places):
@@ -207,6 +214,14 @@ def _before(skeleton: Skeleton, joint: int, places: np.ndarray) -> np.ndarray:
     while np.linalg.norm(places[joint] - places[up]) < NO_BONE and skeleton.parents[up] >= 0:
         up = int(skeleton.parents[up])
     return places[joint] - places[up]
+
+
+def _ahead(skeleton: Skeleton, joint: int, markers: list[int], places: np.ndarray) -> list[int]:
+    """The one of several joints without skin that lies most in the direction of the bone before: others are sockets."""
+    before = _before(skeleton, joint, places)
+    ways = places[markers] - places[joint]
+    along = ways @ before / np.maximum(np.linalg.norm(ways, axis=1) * np.linalg.norm(before), NO_BONE**2)
+    return [markers[int(np.argmax(np.where(np.linalg.norm(ways, axis=1) < NO_BONE, -2, along)))]]
 
 
 def _astray(character: Character, own: list[int], markers: list[int], is_top: bool, meshes, places: np.ndarray) -> bool:

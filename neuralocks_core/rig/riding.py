@@ -4,26 +4,34 @@
 import numpy as np
 
 from neuralocks_core.character import Skeleton
-from neuralocks_core.rig.hair_names import says_face, says_hair
+from neuralocks_core.rig.hair_names import says_worn
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 NO_BONE = 1e-5
 """Shorter bones [m] have no direction."""
 
 
-def in_chains(skeleton: Skeleton, tops: list[int], drives: np.ndarray) -> list[int]:
+def in_chains(skeleton: Skeleton, tops: list[int], drives: np.ndarray, named: list[int] = ()) -> list[int]:
     """The joints of these subtrees, without those that ride on them: deform joints, and what is worn in hair, which is stiff or has an
-    animation of its own.
+    animation of its own, unless hair goes on from it, as from a tie.
+
+    Args:
+        skeleton, drives: as for `riders`.
+        tops: first joints of the subtrees.
+        named: joints that somebody named: what is worn in hair is then hair.
     """
-    names = skeleton.names
     inside = np.any([skeleton.below(top) for top in tops], axis=0)
-    for top in tops:
-        for joint in np.flatnonzero(skeleton.below(top)):
-            ride = riders(skeleton, joint, drives)
-            if joint != top and says_face(names[joint]) and not says_hair(names[joint]) and not says_face(names[top]):
-                ride.append(joint)
-            for each in ride:
-                inside[skeleton.below(each)] = False
+    for joint in np.flatnonzero(inside):
+        ride = riders(skeleton, joint, drives)
+        if (
+            joint not in tops
+            and joint not in named
+            and says_worn(skeleton.names[joint])
+            and drives[skeleton.below(joint)].sum() <= 1
+        ):
+            ride.append(joint)
+        for each in ride:
+            inside[skeleton.below(each)] = False
     return np.flatnonzero(inside).tolist()
 
 
@@ -39,14 +47,20 @@ def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
     places = skeleton.bind[:, :3, 3]
     skins = {child: int(drives[skeleton.below(child)].sum()) for child in skeleton.children[joint]}
     bones = {child: places[child] - places[joint] for child, count in skins.items() if count}
-    last = [child for child in bones if drives[child] and skins[child] == 1]
-    return [child for child in last if _lies_on(bones[child], [bones[c] for c in bones if c != child])]
+    found = []
+    for child in (child for child in bones if drives[child] and skins[child] == 1):
+        if np.linalg.norm(bones[child]) >= NO_BONE:
+            rides = any(_lies_on(bones[child], bones[other]) for other in bones if other != child)
+        else:  # beside a joint with skin of its own, one with an end joint is a strand that begins there
+            rides = not (drives[joint] and skeleton.children[child])
+        found += [child] if rides else []
+    return found
 
 
-def _lies_on(place: np.ndarray, bones: list[np.ndarray]) -> bool:
-    """Whether a place (3,) is where bones (3,) begin, or on one of them."""
-    shares = [np.clip(place @ bone / max(bone @ bone, NO_BONE**2), 0, 1) for bone in bones]
-    return min([np.linalg.norm(place)] + [np.linalg.norm(place - s * b) for s, b in zip(shares, bones)]) < NO_BONE
+def _lies_on(place: np.ndarray, bone: np.ndarray) -> bool:
+    """Whether a place (3,) is on a bone (3,)."""
+    share = np.clip(place @ bone / max(bone @ bone, NO_BONE**2), 0, 1)
+    return bool(np.linalg.norm(place - share * bone) < NO_BONE)
 
 
 def continued(skeleton: Skeleton, joint: int, drives: np.ndarray) -> int:

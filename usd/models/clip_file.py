@@ -30,7 +30,7 @@ ELSEWHERE = 0.01
 
 
 @names_damage
-def read_clip(path: str, character: Character, notes: list[str] | None = None) -> Clip:
+def read_clip(path: str, character: Character, notes: list[str] | None = None, beside: Border | None = None) -> Clip:
     """Motion of a file on a character: BVH is retargeted; a USD skeleton must have the same joints, and is retargeted if they lie
     elsewhere.
 
@@ -38,6 +38,7 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None) -
         path: the file.
         character: who is to move.
         notes: what a user should know is added here.
+        beside: of the character's stage, for what a USD file does not tell of its unit and axis.
 
     Raises:
         NeuralocksError: it holds no such motion.
@@ -56,7 +57,8 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None) -
     alike = [prim for prim, joints in zip(prims, listed) if as_names(joints, joints.Get()) == names]
     if not alike:
         raise NeuralocksError(f"{path}: its skeleton is not the character's; give motion of the same joints, or BVH")
-    rigs, errors = read_each_rig(stage, alike, Border.of(stage), names[character.head], all_shapes=True)
+    border = Border.of(stage) if beside is None else beside.unless_told(stage)
+    rigs, errors = read_each_rig(stage, alike, border, names[character.head], all_shapes=True)
     if not rigs:
         raise errors[0]
     moving = [rig for rig in rigs if len(rig.clip.times) > 1]

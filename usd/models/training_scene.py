@@ -99,7 +99,7 @@ def training_scene(
     for source in grooms or [str(character)]:
         if not _is_style(source):
             found += _file(source, rig, head, joints, notes)
-    clips = tuple(read_clip(path, rig.character, notes) for path in motion)
+    clips = tuple(read_clip(path, rig.character, notes, rig.border) for path in motion)
     scene = TrainingScene(rig.character, tuple(found), clips, seed=seed, gestures=weights, **settings)
     notes += [
         f"{path}: moves for less than {LEAST * scene.span:.1f} s at a time, too short to learn from; give longer motion"

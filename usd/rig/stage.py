@@ -196,11 +196,11 @@ def _of_model(model: HairChains, character: Character) -> HairChains:
 
 
 def of_bake(source: StageRig) -> list[str] | None:
-    """Patterns for the first joints of the chains that a rig bake moves; None if it is no bake, or one of a rig with other joints."""
+    """Patterns for the joints that a rig bake moves; None if it is no bake, or one of a rig with other joints."""
     hair, names = set(source.source.baked_hair), source.source.names
     if not hair or not hair <= set(names):
         return None
-    return [escape(name) for name in names if name in hair and not any(name.startswith(f"{above}/") for above in hair)]
+    return [escape(name) for name in names if name in hair]
 
 
 def is_baked(source: StageRig) -> bool:

@@ -81,7 +81,8 @@ def attach(
     bound = bound_skeleton(prim)
     rig = next((r for r in rigs if r.path == bound), None)
     if rig is not None:
-        to_bind = rig.to_bind @ geom_bind(prim)
+        brought = np.eye(4) if placement.brought is None else placement.brought
+        to_bind = rig.to_bind @ brought @ geom_bind(prim)
         joint, why, shares, turned = _by_own_binding(prim, rig, to_bind)
         notes += turned or [*astray(prim, rig, to_bind), *spread_over(rig, path, joint, shares)]
         found = Attachment(

@@ -4,13 +4,17 @@
 import numpy as np
 
 from neuralocks_core.anatomy.humanoid import BY_HAND
-from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.anatomy.joint_names import leaf, words
 from neuralocks_core.character import Character
 
 from .joints import JointSource
 
 AHEAD = 0.02
-"""Toes and eyes are farther ahead of ankles and head joint than this [m]."""
+"""Eyes are farther ahead of the head joint than this [m], and so far a side is from the other."""
+TOES, NO_TOES = ("toe", "ball"), ("heel", "pole", "ik", "target", "ctrl", "roll", "pivot", "twist")
+"""Words of joints below a foot that are toes, and that are not."""
+FOOT = 0.06
+"""Toes are farther from the ankle than this [m], if no name says that they are toes; heels are nearer."""
 
 
 def backwards_notes(source: JointSource, character: Character) -> list[str]:
@@ -33,9 +37,9 @@ def _behind(character: Character, names: list[str]) -> str:
     bind, found = character.skeleton.bind[:, :3, 3] @ character.facing.T, {}
     for side in ("left", "right"):
         foot, eye = (character.humanoid.get(f"{side}_{part}") for part in ("foot", "eye"))
-        if foot is not None and character.skeleton.children[foot]:
-            ways = bind[character.skeleton.children[foot]] - bind[foot]
-            # A heel's joint is nearer to the ankle than the toes'.
+        toes = [] if foot is None else _toes(character, foot, names)
+        if toes:
+            ways = bind[toes] - bind[foot]
             found.setdefault("its toes point", []).append(ways[np.hypot(ways[:, 0], ways[:, 2]).argmax(), 2])
         if eye is not None:
             found.setdefault("its eyes point", []).append(bind[eye, 2] - bind[character.head, 2])
@@ -45,6 +49,15 @@ def _behind(character: Character, names: list[str]) -> str:
     if not found and None not in legs and bind[legs[0], 0] - bind[legs[1], 0] < -AHEAD:
         return f"{_both(legs, names)} say"
     return next(iter(found), "")
+
+
+def _toes(character: Character, foot: int, names: list[str]) -> list[int]:
+    """Joints below a foot that tell where it points."""
+    below, places = character.skeleton.children[foot], character.skeleton.bind[:, :3, 3]
+    said = {joint: words(leaf(names[joint])) for joint in below}
+    named = [joint for joint in below if any(word.startswith(TOES) for word in said[joint])]
+    far = [joint for joint in below if np.linalg.norm((places[joint] - places[foot])[[0, 2]]) > FOOT]
+    return named or [joint for joint in far if not any(word.startswith(NO_TOES) for word in said[joint])]
 
 
 def _both(joints, names: list[str]) -> str:

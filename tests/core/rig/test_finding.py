@@ -168,6 +168,43 @@ def test_sockets_and_pins_on_a_chain_are_none_of_its_bones(what, aside):
     np.testing.assert_allclose(np.linalg.norm(chains.bones, axis=1), np.hypot(0.06, 0.01), rtol=1e-6)
 
 
+@pytest.mark.parametrize("tie", ["hair_tie", "HairBand_L", "ribbon_1", "flower"])
+@pytest.mark.parametrize("patterns", [None, ["pony_1"]])
+def test_hair_goes_on_from_what_ties_it(tie, patterns):
+    rows = tail("pony", 5)
+    rows = [(tie if name == "pony_2" else name, tie if parent == "pony_2" else parent, at) for name, parent, at in rows]
+    who = character([*rows, ("temple_L", "pony_1", (0.1, 1.5, 0)), ("temple_L_2", "temple_L", (0.1, 1.4, 0))])
+    names = ("pony_1", tie, "pony_3", "pony_4", "temple_L", "temple_L_2")
+    skins = {name: np.eye(3) * 0.03 + [0, 1.62 - 0.06 * i, -0.1] for i, name in enumerate(names)}
+    assert find_chains(who, [skin(who, skins)], patterns).names == names
+
+
+def test_a_pin_that_is_named_is_hair():
+    pin = [("HairPin_L", "hair_1", (0.05, 1.5, -0.1)), ("HairPin_end", "HairPin_L", (0.05, 1.45, -0.1))]
+    who = character([*tail("hair", 3), *pin])
+    skins = {name: np.eye(3) * 0.05 + [0, 1.55, -0.1] for name in ("hair_1", "hair_2", "HairPin_L")}
+    for patterns, own in ((None, False), (["hair_1"], False), (["hair_1", "HairPin*"], True)):
+        assert ("HairPin_L" in find_chains(who, [skin(who, skins)], patterns).names) == own
+
+
+def test_a_strand_that_begins_at_a_joint_of_hair_is_refused_rather_than_left_still():
+    rows = tail("hair", 4)
+    at = rows[1][2]
+    who = character([*rows, ("hair_b", "hair_2", at), ("hair_b_end", "hair_b", tuple(np.add(at, (0.05, -0.05, 0))))])
+    skins = {name: np.eye(3) * 0.05 + [0, 1.5, -0.1] for name in ("hair_1", "hair_2", "hair_3", "hair_b")}
+    with pytest.raises(NeuralocksError, match="no length"):
+        find_chains(who, [skin(who, skins)])
+
+
+def test_of_two_ends_the_one_ahead_is_the_bones():
+    rows = [*tail("hair", 3), ("socket", "hair_2", (0.45, 1.54, -0.1))]
+    who = character(rows)
+    skins = {name: np.eye(3) * 0.05 + [0, 1.5, -0.1] for name in ("hair_1", "hair_2")}
+    np.testing.assert_allclose(
+        np.linalg.norm(find_chains(who, [skin(who, skins)]).bones, axis=1), np.hypot(0.06, 0.01), rtol=1e-6
+    )
+
+
 def test_a_bone_without_length_is_told_with_the_joint_at_its_place():
     rows = tail("hair", 4)
     who = character([*rows, ("hair_b", "hair_2", rows[1][2]), ("hair_c", "hair_b", tuple(np.add(rows[1][2], 0.05)))])

@@ -166,11 +166,13 @@ def test_motion_of_a_character_whose_head_has_another_name_needs_no_second_word(
 
 @pytest.mark.parametrize("character", [Recipe(bound="mesh"), Recipe(bound="mesh", unit=0.01, up="Z")])
 @pytest.mark.parametrize("groom", [{}, {"unit": 0.01}, {"up": "Z"}, {"unit": 0.01, "up": "Z"}])
-def test_a_groom_in_a_file_of_its_own_has_that_files_unit_and_axis(tmp_path, character, groom):
+@pytest.mark.parametrize("bound", ["none", "own"])
+def test_a_groom_in_a_file_of_its_own_has_that_files_unit_and_axis(tmp_path, character, groom, bound):
     """Or the character's, as far as its file does not tell."""
-    path, groom, told = write_shot(tmp_path, character), Recipe(bound="none", **groom), []
+    path, groom, told = write_shot(tmp_path, character), Recipe(bound=bound, **groom), []
     hair = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, groom, "groom")))
-    del hair.GetPrimAtPath("/Hero").nameChildren["Rig"]
+    for name in {*hair.GetPrimAtPath("/Hero").nameChildren.keys()} - {"Hair"}:
+        del hair.GetPrimAtPath("/Hero").nameChildren[name]
     hair.Export(str(tmp_path / "alone.usda"))
     wanted = training_scene(path).grooms[0]
     found = training_scene(path, [str(tmp_path / "alone.usda")], tell=told.extend).grooms[0]
@@ -195,6 +197,17 @@ def test_a_groom_that_is_not_on_the_head_and_empty_curves_are_told(tmp_path):
     stage.Save()
     training_scene(path, [str(tmp_path / "away.usda")], tell=told.extend)
     assert [note for note in told if note.startswith("/Hair: lies ") and "check the file's metersPerUnit" in note]
+
+
+def test_motion_that_tells_no_unit_and_axis_has_the_characters(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh", unit=0.01, up="Z"))
+    (rig,) = read_rigs(path)
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    for name in ("metersPerUnit", "upAxis"):
+        layer.pseudoRoot.ClearInfo(name)
+    layer.Export(str(tmp_path / "untold.usda"))
+    clip = read_clip(str(tmp_path / "untold.usda"), rig.character, beside=rig.border)
+    np.testing.assert_allclose(clip.joints, rig.clip.joints, atol=1e-6)
 
 
 @pytest.mark.parametrize("change", ["turned", "halved"])

@@ -48,6 +48,21 @@ def test_whatever_else_has_a_side_tells_that_arms_are_swapped(gone, witness):
     assert [witness in note and note.endswith("swapped, check --joint") for note in said] == [True] * bool(witness)
 
 
+@pytest.mark.parametrize(("below_foot", "told"), [("heel", False), ("knee_pole", False), ("toe", True), ("Bone", True)])
+def test_what_is_behind_a_foot_tells_only_if_it_may_be_toes(below_foot, told, monkeypatch):
+    """A heel or a pole is behind a foot that points ahead."""
+    for side, x in (("L", 0.1), ("R", -0.1)):
+        leg = f"hips/thigh_{side}/shin_{side}"
+        places = {
+            leg: (x, 0.5, 0),
+            f"{leg}/foot_{side}": (x, 0.1, 0),
+            f"{leg}/foot_{side}/{below_foot}_{side}": (x, 0.02, -0.1),
+        }
+        for name, place in places.items():
+            monkeypatch.setitem(PLACES, name, place)
+    assert bool(_told([name for name in PLACES if "eye" not in name])) == told
+
+
 def test_a_shot_whose_arms_are_named_by_hand_the_wrong_way_round_says_so():
     assert not [note for note in read_shot(SHOT).notes if "faces" in note]
     (said,) = [note for note in read_shot(SHOT, joints=ARMS).notes if "faces" in note]
