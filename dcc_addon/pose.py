@@ -27,6 +27,12 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
         raise NeuralocksError(f"{armature.name_full}: its bones have changed; press Sample Motion")
     if moved and sampled.key[0] != timing_of(scene):
         sampled.stale = session.wanting = True
+        if graph.mode == "RENDER":  # all scenes were sampled before the first was drawn
+            _tell_misrendered(
+                armature.name_full,
+                f"hair may be wrong in the last render of scene '{scene.name}': it is rendered with other scenes that share the "
+                "character, but not the frame range, the frame rate or Samples; give them the same",
+            )
     world = reader.world(evaluated) @ sampled.trim
     row = sampled.motion.row(shown_frame(scene))
     if row is not None:
@@ -40,7 +46,11 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
         elif moved:
             sampled.stale = session.wanting = True
             if graph.mode == "RENDER":
-                _tell_misrendered(armature.name_full, scene)
+                _tell_misrendered(
+                    armature.name_full,
+                    f"hair may be wrong in the last render, from frame {shown_frame(scene):g} on, where the character moves otherwise "
+                    "than when its motion was sampled; render again, and if that does not help, bake the simulation that moves it",
+                )
     drawn = to_core(sampled.motion.metres_per_unit) @ world
     for joint in {sampled.character.head, *sampled.carriers.values()}:
         drawn[joint] = as_carried(drawn[joint], armature.name_full)
@@ -62,15 +72,12 @@ def _tell_late(name: str) -> None:
         print(f"Neuralocks: {message}")
 
 
-def _tell_misrendered(name: str, scene) -> None:
+def _tell_misrendered(name: str, fact: str) -> None:
     """Say, also on the console, that a render shows a character otherwise than it was sampled, of which nothing told before: its hair
     remembers the motion of before, also in later frames that are as they were.
     """
     if name not in session.misrendered:
-        session.misrendered[name] = (
-            f"{name}: hair may be wrong in the last render, from frame {shown_frame(scene):g} on, where the character moves otherwise "
-            "than when its motion was sampled; render again, and if that does not help, bake the simulation that moves it"
-        )
+        session.misrendered[name] = f"{name}: {fact}"
         print(f"Neuralocks: {session.misrendered[name]}")
 
 

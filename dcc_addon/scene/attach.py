@@ -141,7 +141,9 @@ def detach(hair) -> bool:
     if not has_cache(hair):  # it may have been removed by hand
         unmute_deformers(hair, REPLACED)
         return False
-    cached_strands.forget(hair.data)
+    # Another object with the same curves may play its cache on.
+    if not any(other.data == hair.data and other != hair and has_cache(other) for other in bpy.data.objects):
+        cached_strands.forget(hair.data)
     modifier = hair.modifiers[MODIFIER]
     cache, original = modifier.cache_file, _original(hair, modifier)
     if original is None:

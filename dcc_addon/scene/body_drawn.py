@@ -63,7 +63,8 @@ def all_told(armature, bodies: list, seen: dict, character, clip, unit: float) -
 
 
 def _told(mesh_object, far: float) -> str:
-    why = ", ".join(_causes(mesh_object)) or "look at its parent, its weights and its bones"
+    look = "look at its parent, its weights and its bones"
+    why = f"{causes}; or {look}" if (causes := ", ".join(_causes(mesh_object))) else look
     return (
         f"{mesh_object.name_full}: hair is kept out of the shape that weights and shape keys give it; near the head it is drawn "
         f"up to {1000 * far:.0f} mm from that: {why}"

@@ -362,3 +362,27 @@ def other_strands_than_baked(folder: Path) -> None:
     cache.show_viewport = cache.show_render = False
     assert ops.neuralocks.bake() == {"FINISHED"} and not is_shown(), "the artist has hidden it"
     assert not messages(), messages()
+
+
+def one_of_two_taken_off(folder: Path) -> None:
+    """Two objects have the same curves, both with a cache: after one is detached, the other's is still off where strands are deleted."""
+    needs_usd()
+    if bpy.app.version < (4, 2):
+        raise SkipTest("this Blender deletes no strands")
+    rig, scene = scenes.armature(), bpy.context.scene
+    scenes.dance(rig)
+    strands = scenes.hair(rig, 12)
+    make_live(rig, strands)
+    twin = strands.copy()
+    scene.collection.objects.link(twin)
+    for hair in (strands, twin):
+        scene.neuralocks.hair = hair
+        assert bpy.ops.neuralocks.bake_attach(filepath=str(folder / f"{hair.name}.usdc")) == {"FINISHED"}
+    scene.neuralocks.hair = strands
+    assert bpy.ops.neuralocks.detach() == {"FINISHED"}
+    cache = twin.modifiers["Neuralocks Cache"]
+    assert cache.show_viewport and "Neuralocks Cache" not in strands.modifiers
+    twin.data.add_curves([24, 24])
+    twin.data.update_tag()
+    bpy.context.view_layer.update()
+    assert not cache.show_viewport and not cache.show_render
