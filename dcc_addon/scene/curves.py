@@ -45,9 +45,10 @@ def shown(data, out: np.ndarray | None = None) -> np.ndarray:
 
 
 def radius(data) -> np.ndarray | None:
-    """(P,) float32 in the object's space, or None."""
+    """Of each point (P,) or of each strand (S,), float32 in the object's space, or None."""
     attribute = data.attributes.get("radius")
-    if attribute is None or attribute.domain != "POINT" or len(attribute.data) != len(data.points):
+    sizes = {"POINT": len(data.points), "CURVE": len(data.curves)}
+    if attribute is None or sizes.get(attribute.domain) != len(attribute.data):
         return None
     values = np.empty(len(attribute.data), np.float32)
     attribute.data.foreach_get("value", values)

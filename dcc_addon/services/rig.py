@@ -261,7 +261,7 @@ def groom(
         points: (P, 3) in the hair object's space; counts: (S,).
         place: world transform (4, 4) of the hair object in the bind pose.
         metres: of one unit of the bind pose; see `SampledRig.bind_metres`.
-        radius: (P,) in the hair object's space.
+        radius: of each point (P,) or strand (S,), in the hair object's space.
     """
     check_strands(name, points, counts)
     matrix = to_core(metres) @ place

@@ -227,6 +227,8 @@ def drawn_alike(folder: Path) -> None:
         turn = np.repeat([0, 1, 2], counts) + 6 * along
         points = np.stack([0.08 * np.cos(turn), 0.08 * np.sin(turn), 1.72 - 0.25 * along], axis=1)
         data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
+        if kind == "POLY" and bpy.app.version >= (5, 0):  # one radius for each strand, as geometry nodes may leave it
+            data.attributes.new("radius", "FLOAT", "CURVE").data.foreach_set("value", [0.001, 0.003, 0.002])
         strands = bpy.data.objects.new(kind, data)
         scene.collection.objects.link(strands)
         strands.parent = rig
