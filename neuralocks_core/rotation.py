@@ -155,6 +155,17 @@ def relative_to_parents(world: np.ndarray, parents: np.ndarray) -> np.ndarray:
     return local
 
 
+def from_parents(local: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """Transforms of joints (..., J, 4, 4) in their skeleton's space from those relative to their parents (J,), which come first: the
+    inverse of `relative_to_parents`.
+    """
+    world = local.copy()
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            world[..., joint, :, :] = world[..., parent, :, :] @ world[..., joint, :, :]
+    return world
+
+
 def rotation_part(transforms: np.ndarray, subject: str = "transform") -> np.ndarray:
     """Rotation (..., 3, 3) of transforms (..., 4, 4), with scale divided out.
 

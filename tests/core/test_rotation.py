@@ -72,6 +72,17 @@ def test_affine_transforms_are_undone_by_their_inverse_and_flat_ones_refused():
         rotation.inverse(transform)
 
 
+def test_transforms_relative_to_parents_lead_back_to_those_in_the_skeletons_space():
+    rng, parents = np.random.default_rng(4), np.array([-1, 0, 1, 1, -1, 4])
+    local = np.tile(np.eye(4), (3, 6, 1, 1))
+    local[..., :3, :3] = rotation.from_vector(rng.normal(size=(3, 6, 3)))
+    local[..., :3, 3] = rng.normal(size=(3, 6, 3))
+    kept, world = local.copy(), rotation.from_parents(local, parents)
+    np.testing.assert_allclose(world[:, 3], local[:, 0] @ local[:, 1] @ local[:, 3], atol=1e-12)
+    np.testing.assert_allclose(rotation.relative_to_parents(world, parents), local, atol=1e-12)
+    np.testing.assert_array_equal(local, kept)
+
+
 def test_mirrored_and_flat_transforms_are_refused():
     with pytest.raises(NeuralocksError, match="mirrored"):
         rotation.rotation_part(np.diag([-1.0, 1, 1, 1]), "joint")

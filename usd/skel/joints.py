@@ -11,7 +11,7 @@ from pxr import Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import from_quaternion, relative_to_parents
+from neuralocks_core.rotation import from_parents, from_quaternion, relative_to_parents
 
 from ..border.arrays import wxyz
 from ..border.placement import Placement
@@ -99,19 +99,15 @@ class JointSource:
         """Joints (T, J, 4, 4) in stage world space at time codes (T,), as UsdSkel evaluates them."""
         # A shot may go on for thousands of frames after its animation: a pose that is held is computed once.
         codes, rows = np.unique(np.clip(time_codes, *self._keyed), return_inverse=True)
-        return np.stack([self.placement.at(t) for t in time_codes])[:, None] @ self._from_roots(self.local(codes))[rows]
+        return (
+            np.stack([self.placement.at(t) for t in time_codes])[:, None]
+            @ from_parents(self.local(codes), self.parents)[rows]
+        )
 
     @property
     def at_rest(self) -> np.ndarray:
         """Joints (J, 4, 4) in stage world space in the rest pose, which UsdSkel shows without an animation."""
-        return self.placement.reference @ self._from_roots(self.rest[None].copy())[0]
-
-    def _from_roots(self, local: np.ndarray) -> np.ndarray:
-        """Joints (T, J, 4, 4) in the skeleton's space, written over their local transforms."""
-        for joint, parent in enumerate(self.parents):  # parents come first
-            if parent >= 0:
-                local[:, joint] = local[:, parent] @ local[:, joint]
-        return local
+        return self.placement.reference @ from_parents(self.rest, self.parents)
 
     @cached_property
     def _keyed(self) -> tuple[float, float]:
@@ -181,10 +177,7 @@ class JointSource:
             )
         if bind is None:
             self.notes.append(f"{self.path}: no bindTransforms; the rest pose serves as bind pose")
-            bind = rest.copy()
-            for joint, parent in enumerate(self.parents):
-                if parent >= 0:
-                    bind[joint] = bind[parent] @ bind[joint]
+            bind = from_parents(rest, self.parents)
         if rest is None:
             rest = relative_to_parents(bind, self.parents)
         return bind, rest
