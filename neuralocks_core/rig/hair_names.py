@@ -74,6 +74,16 @@ def says_worn(name: str) -> bool:
     return _worn_in_hair(name) or not says_hair(name) and bool(_begins(name, _ORNAMENTS))
 
 
+def says_end(name: str) -> bool:
+    """Whether a joint's path or name means the end of a bone."""
+    return _begins(name, "end$|nub$|tip$|leaf$")
+
+
+def says_twist(name: str) -> bool:
+    """Whether a joint's path or name means that it turns about the bone that it lies on, with another joint."""
+    return _begins(name, "twist|twst|roll$")
+
+
 def _no_hair(name: str) -> bool:
     """Whether a name that has a word for hair means what is worn in it, or skin."""
     return _worn_in_hair(name) or words(_own(name))[:1] == [_SCALP]

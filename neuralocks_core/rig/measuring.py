@@ -9,6 +9,7 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
+from neuralocks_core.rig.hair_names import says_end
 from neuralocks_core.rig.riding import NO_BONE, continued, driving, in_chains, riders
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import rotation_part
@@ -217,7 +218,10 @@ def _before(skeleton: Skeleton, joint: int, places: np.ndarray) -> np.ndarray:
 
 
 def _ahead(skeleton: Skeleton, joint: int, markers: list[int], places: np.ndarray) -> list[int]:
-    """The one of several joints without skin that lies most in the direction of the bone before: others are sockets."""
+    """The one of several joints without skin that is called an end, or lies most in the direction of the bone before: others are
+    sockets.
+    """
+    markers = [marker for marker in markers if says_end(skeleton.names[marker])] or markers
     before = _before(skeleton, joint, places)
     ways = places[markers] - places[joint]
     along = ways @ before / np.maximum(np.linalg.norm(ways, axis=1) * np.linalg.norm(before), NO_BONE**2)

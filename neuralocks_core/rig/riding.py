@@ -4,7 +4,7 @@
 import numpy as np
 
 from neuralocks_core.character import Skeleton
-from neuralocks_core.rig.hair_names import says_worn
+from neuralocks_core.rig.hair_names import says_twist, says_worn
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 NO_BONE = 1e-5
@@ -23,16 +23,17 @@ def in_chains(skeleton: Skeleton, tops: list[int], drives: np.ndarray, named: li
     inside = np.any([skeleton.below(top) for top in tops], axis=0)
     for joint in np.flatnonzero(inside):
         ride = riders(skeleton, joint, drives)
-        if (
-            joint not in tops
-            and joint not in named
-            and says_worn(skeleton.names[joint])
-            and drives[skeleton.below(joint)].sum() <= 1
-        ):
+        if joint not in tops and joint not in named and _only_worn(skeleton, joint, drives):
             ride.append(joint)
         for each in ride:
             inside[skeleton.below(each)] = False
     return np.flatnonzero(inside).tolist()
+
+
+def _only_worn(skeleton: Skeleton, joint: int, drives: np.ndarray) -> bool:
+    """Whether a joint is worn in hair, with all that drives skin below it."""
+    below = [joint, *np.flatnonzero(skeleton.below(joint) & drives)]
+    return all(says_worn(skeleton.names[each]) for each in below)
 
 
 def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
@@ -50,7 +51,9 @@ def riders(skeleton: Skeleton, joint: int, drives: np.ndarray) -> list[int]:
     found = []
     for child in (child for child in bones if drives[child] and skins[child] == 1):
         if np.linalg.norm(bones[child]) >= NO_BONE:
-            rides = any(_lies_on(bones[child], bones[other]) for other in bones if other != child)
+            rides = says_twist(skeleton.names[child]) and any(
+                _lies_on(bones[child], bones[other]) for other in bones if other != child
+            )
         else:  # beside a joint with skin of its own, one with an end joint is a strand that begins there
             rides = not (drives[joint] and skeleton.children[child])
         found += [child] if rides else []

@@ -57,8 +57,10 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None, b
     alike = [prim for prim, joints in zip(prims, listed) if as_names(joints, joints.Get()) == names]
     if not alike:
         raise NeuralocksError(f"{path}: its skeleton is not the character's; give motion of the same joints, or BVH")
-    border = Border.of(stage) if beside is None else beside.unless_told(stage)
-    rigs, errors = read_each_rig(stage, alike, border, names[character.head], all_shapes=True)
+    # What a file does not tell is either USD's own or, as exporters leave it out, the character's: its bind pose says which.
+    borders = dict.fromkeys([Border.of(stage)] if beside is None else [Border.of(stage), beside.unless_told(stage)])
+    read = [read_each_rig(stage, alike, border, names[character.head], all_shapes=True) for border in borders]
+    rigs, errors = min(read, key=lambda each: min((_apart(character, rig).max() for rig in each[0]), default=np.inf))
     if not rigs:
         raise errors[0]
     moving = [rig for rig in rigs if len(rig.clip.times) > 1]
@@ -72,7 +74,7 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None, b
 def _on(character: Character, mover: StageRig, path: Path, notes: list[str] | None) -> Clip:
     """The clip of another file's skeleton on a character that has the same joints, though perhaps in other places or axes."""
     clip, theirs, ours = mover.clip, mover.character.skeleton.bind, character.skeleton.bind
-    apart = np.linalg.norm(theirs[:, :3, 3] - ours[:, :3, 3], axis=1)
+    apart = _apart(character, mover)
     if apart.max() <= ELSEWHERE * np.ptp(ours[:, 1, 3]):
         return replace(clip, joints=clip.joints @ np.linalg.inv(theirs) @ ours)
     if notes is not None:
@@ -82,3 +84,8 @@ def _on(character: Character, mover: StageRig, path: Path, notes: list[str] | No
             "retargeted, as a BVH's is"
         )
     return retarget(Motion(path.stem, mover.character.skeleton, clip, 1.0), character)
+
+
+def _apart(character: Character, mover: StageRig) -> np.ndarray:
+    """How far each joint (J,) of another file's skeleton lies from the character's in the bind pose [m]."""
+    return np.linalg.norm(mover.character.skeleton.bind[:, :3, 3] - character.skeleton.bind[:, :3, 3], axis=1)

@@ -8,13 +8,14 @@ the binding of that mesh, the joint named by the user, a joint named like a head
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pxr import Usd
+from pxr import Usd, UsdSkel
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
+from ..border.arrays import column_matrix
 from ..border.placement import Placement
 from ..skel.binding import bound_skeleton, geom_bind, joint_influences
 from ..skel.stage_rig import StageRig
@@ -81,8 +82,7 @@ def attach(
     bound = bound_skeleton(prim)
     rig = next((r for r in rigs if r.path == bound), None)
     if rig is not None:
-        brought = np.eye(4) if placement.brought is None else placement.brought
-        to_bind = rig.to_bind @ brought @ geom_bind(prim)
+        to_bind = rig.to_bind @ _between_binds(prim, rig, placement) @ geom_bind(prim)
         joint, why, shares, turned = _by_own_binding(prim, rig, to_bind)
         notes += turned or [*astray(prim, rig, to_bind), *spread_over(rig, path, joint, shares)]
         found = Attachment(
@@ -108,6 +108,22 @@ def attach(
         option = "--head " if head else "--joint head="
         notes.append(f"{path}: {option}{asked} is not used, the groom is carried by {found.how}")
     return found
+
+
+def _between_binds(prim: Usd.Prim, rig: StageRig, placement: Placement) -> np.ndarray:
+    """From the bind space of a groom's own file to the rig's (4, 4), as authored: their bind poses tell, if its file has the skeleton,
+    too; its unit may have been brought by a transform above.
+    """
+    if placement.brought is None:
+        return np.eye(4)
+    skeleton = UsdSkel.Skeleton(prim.GetStage().GetPrimAtPath(rig.path))
+    names, binds = (
+        list(a.Get() or ()) if a else [] for a in (skeleton.GetJointsAttr(), skeleton.GetBindTransformsAttr())
+    )
+    name = rig.source.names[rig.character.head]
+    if name not in names or len(names) != len(binds):
+        return placement.brought
+    return rig.source.bind[rig.character.head] @ np.linalg.inv(column_matrix(binds[names.index(name)]))
 
 
 def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement, seated: bool) -> tuple[str, str] | None:

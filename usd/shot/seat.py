@@ -29,11 +29,13 @@ NEAR = 0.03
 UNEVEN, SURELY = 1e-3, 5
 """Roots that a likely way puts near skin, but UNEVEN [m] or more `_off_faces`, are taken by another way if they are SURELY times less
 so by it."""
+UNSURE = 5e-3
+"""Roots that are on faces may be farther from their corners than others that are not, but hardly by more than this [m]."""
 HOVER = 0.1
 """How much the same distance of all roots from the skin counts, beside how much the distances differ."""
-ON_FACES = 5e-3
+ON_FACES, MANY = 5e-3, 5
 """Hair that is on no skin otherwise was made in the rest pose if its roots are no farther than this from faces there, in the median [m],
-and all alike."""
+and all alike; fewer than so MANY must be right on them."""
 SOME_ROOTS = 1000
 """About how many of a groom's roots are looked at: all would be too many."""
 
@@ -135,7 +137,7 @@ def _on_faces(seat: Seat, roots: np.ndarray, others: list[np.ndarray]) -> Seat |
     for place, to_bind in enumerate(others):
         placed = transformed(roots, to_bind)
         middle = float(np.median(seat.skin.query(placed, NEAR)[0]))
-        if np.isfinite(middle):
+        if middle <= seat.distance + UNSURE:  # faces take far longer to ask than points
             near.append(replace(seat, distance=middle, to_bind=to_bind, way=(True, place), roots=placed))
     if not near or (surface := seat.rig.surface) is None or (off := _off_faces(surface, seat.roots)) < UNEVEN:
         return None
@@ -151,7 +153,7 @@ def _on_skin_at_rest(rig: StageRig, roots: np.ndarray, at_rest: np.ndarray) -> S
     if not far[nearest] <= NEAR or rig.surface is None:
         return None
     off = np.abs(rig.surface.distance(placed)[0])
-    if np.median(off) > ON_FACES or _off_faces(rig.surface, placed) > UNEVEN:
+    if np.median(off) > (ON_FACES if len(placed) >= MANY else UNEVEN) or _off_faces(rig.surface, placed) > UNEVEN:
         return None
     return Seat(far[nearest], rig, rig.meshes[nearest], at_rest, (True, 0), placed, rig.skins[nearest])
 

@@ -55,9 +55,9 @@ def _toes(character: Character, foot: int, names: list[str]) -> list[int]:
     """Joints below a foot that tell where it points."""
     below, places = character.skeleton.children[foot], character.skeleton.bind[:, :3, 3]
     said = {joint: words(leaf(names[joint])) for joint in below}
+    below = [joint for joint in below if not any(word.startswith(NO_TOES) for word in said[joint])]
     named = [joint for joint in below if any(word.startswith(TOES) for word in said[joint])]
-    far = [joint for joint in below if np.linalg.norm((places[joint] - places[foot])[[0, 2]]) > FOOT]
-    return named or [joint for joint in far if not any(word.startswith(NO_TOES) for word in said[joint])]
+    return named or [joint for joint in below if np.linalg.norm((places[joint] - places[foot])[[0, 2]]) > FOOT]
 
 
 def _both(joints, names: list[str]) -> str:

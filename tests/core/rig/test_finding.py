@@ -179,6 +179,37 @@ def test_hair_goes_on_from_what_ties_it(tie, patterns):
     assert find_chains(who, [skin(who, skins)], patterns).names == names
 
 
+@pytest.mark.parametrize("at_once", [True, False], ids=["from_one_point", "in_a_row"])
+def test_strands_of_one_joint_do_not_take_each_other_for_twist_joints(at_once):
+    rows, ways = tail("hair", 3)[:2], [(-0.05, -0.1, 0), (0.05, -0.1, 0), (0.0, -0.1, 0.05)]
+    for i, way in enumerate(ways):
+        place = np.add(rows[1][2], (0 if at_once else 0.02 * (i + 1), -0.05, 0) if at_once else (0.02 * (i + 1), 0, 0))
+        rows += [(f"tip_{i}", "hair_2", tuple(place)), (f"tip_{i}_end", f"tip_{i}", tuple(place + way))]
+    who = character(rows)
+    names = ("hair_1", "hair_2", "tip_0", "tip_1", "tip_2")
+    skins = {name: np.eye(3) * 0.05 + [0, 1.5, -0.1] for name in names}
+    assert find_chains(who, [skin(who, skins)]).names == names
+
+
+@pytest.mark.parametrize("tie_has_skin", [True, False])
+def test_a_tail_of_one_joint_goes_on_from_its_tie(tie_has_skin):
+    rows = [
+        (name.replace("hair_2", "hair_tie"), above.replace("hair_2", "hair_tie"), at)
+        for name, above, at in tail("hair", 4)
+    ]
+    who = character(rows)
+    names = ["hair_1", "hair_3"] + ["hair_tie"] * tie_has_skin
+    chains = find_chains(who, [skin(who, {name: np.eye(3) * 0.05 + [0, 1.5, -0.1] for name in names})])
+    assert chains.names == ("hair_1", "hair_tie", "hair_3")
+
+
+def test_an_end_that_curls_back_is_still_the_end():
+    rows = [*tail("hair", 2), ("hair_2_end", "hair_2", (0.02, 1.56, -0.14)), ("socket", "hair_2", (0.0, 1.5, -0.115))]
+    who = character(rows)
+    skins = {"hair_1": np.eye(3) * 0.05 + [0, 1.5, -0.1], "hair_2": np.eye(3) * 0.01 + [0.02, 1.56, -0.14]}
+    np.testing.assert_allclose(find_chains(who, [skin(who, skins)]).bones[1], (0.02, 0.02, -0.03), atol=1e-9)
+
+
 def test_a_pin_that_is_named_is_hair():
     pin = [("HairPin_L", "hair_1", (0.05, 1.5, -0.1)), ("HairPin_end", "HairPin_L", (0.05, 1.45, -0.1))]
     who = character([*tail("hair", 3), *pin])

@@ -199,10 +199,14 @@ def test_a_groom_that_is_not_on_the_head_and_empty_curves_are_told(tmp_path):
     assert [note for note in told if note.startswith("/Hair: lies ") and "check the file's metersPerUnit" in note]
 
 
-def test_motion_that_tells_no_unit_and_axis_has_the_characters(tmp_path):
-    path = write_shot(tmp_path, Recipe(bound="mesh", unit=0.01, up="Z"))
+@pytest.mark.parametrize("told", [Recipe(bound="mesh", unit=0.01, up="Z"), Recipe(bound="mesh", unit=1.0)])
+@pytest.mark.parametrize("untold", ["as the character's", "as USD has it"])
+def test_motion_that_tells_no_unit_and_axis_is_read_as_its_bind_pose_says(tmp_path, told, untold):
+    """A file may leave out what is the character's, or what is USD's own: centimetres, Y up."""
+    path = write_shot(tmp_path, told)
     (rig,) = read_rigs(path)
-    layer = Sdf.Layer.FindOrOpen(str(path))
+    other = path if "character" in untold else write_shot(tmp_path, Recipe(bound="mesh", unit=0.01), "other")
+    layer = Sdf.Layer.FindOrOpen(str(other))
     for name in ("metersPerUnit", "upAxis"):
         layer.pseudoRoot.ClearInfo(name)
     layer.Export(str(tmp_path / "untold.usda"))
