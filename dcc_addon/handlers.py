@@ -77,9 +77,7 @@ def on_update(scene, graph):
         session.wanting = session.wanting or bool(session.failed)
         session.failed.clear()
     moving = frozenset(names).union(*(session.rigs[name].moved_by for name in names & session.rigs.keys()))
-    placed = {hair.name_full for hair in live_hairs(scene)} & {
-        u.id.name_full for u in graph.updates if u.is_updated_transform
-    }
+    placed = any(u.is_updated_transform and _is_live(u.id.original) for u in graph.updates)
     if moving & objects.keys() or placed:
         background.doubt()
     elif any(isinstance(thing, bpy.types.Scene) for thing in changed):  # a body may be drawn or hidden
@@ -202,9 +200,14 @@ def _catch_up() -> None:
         background.request()
 
 
+def _is_live(thing) -> bool:
+    """Whether this is a live hair object."""
+    return isinstance(thing, bpy.types.Object) and thing.type == "CURVES" and thing.neuralocks_hair.live
+
+
 def _edited(thing) -> bool:
     """Whether this is live hair that enters or leaves editing, or was given other strands or points."""
-    if thing.type != "CURVES" or not thing.neuralocks_hair.live:
+    if not _is_live(thing):
         return False
     return thing.mode in EDITING or not known(thing) or touched(thing)
 

@@ -130,14 +130,15 @@ def _moving(
     """
     skeleton = character.skeleton
     drives = driving(skeleton, meshes)
-    order = in_chains(skeleton, tops, drives, named)
+    inside = in_chains(skeleton, tops, drives, named)
+    order = np.flatnonzero(inside).tolist()
     carries = _carrying(skeleton, order, drives)
     rows, free, ends = {}, {}, {}
     for joint in order:
         if continued(skeleton, joint, drives) != joint:
             continue
         riding = riders(skeleton, joint, drives)
-        beyond = [child for child in skeleton.children[joint] if child in order]
+        beyond = [child for child in skeleton.children[joint] if inside[child]]
         # What has no skin beside what has some is a socket or a pole, and not where the bone ends.
         beyond = [child for child in beyond if child in carries] or beyond
         if len(beyond) > 1 and not carries.intersection(beyond):

@@ -11,9 +11,9 @@ NO_BONE = 1e-5
 """Shorter bones [m] have no direction."""
 
 
-def in_chains(skeleton: Skeleton, tops: list[int], drives: np.ndarray, named: list[int] = ()) -> list[int]:
-    """The joints of these subtrees, without those that ride on them: deform joints, and what is worn in hair, which is stiff or has an
-    animation of its own, unless hair goes on from it, as from a tie.
+def in_chains(skeleton: Skeleton, tops: list[int], drives: np.ndarray, named: list[int] = ()) -> np.ndarray:
+    """Which joints (J,) bool are in these subtrees and do not ride on them, as deform joints do, and what is worn in hair, which is stiff
+    or has an animation of its own, unless hair goes on from it, as from a tie.
 
     Args:
         skeleton, drives: as for `riders`.
@@ -27,7 +27,7 @@ def in_chains(skeleton: Skeleton, tops: list[int], drives: np.ndarray, named: li
             ride.append(joint)
         for each in ride:
             inside[skeleton.below(each)] = False
-    return np.flatnonzero(inside).tolist()
+    return inside
 
 
 def _only_worn(skeleton: Skeleton, joint: int, drives: np.ndarray) -> bool:

@@ -27,7 +27,7 @@ from ..shot.curve_ends import beyond_ends
 from ..shot.curves import find_curves, read_groom, widths_attribute, without_points
 from ..shot.groom_notes import no_points
 from ..shot.notes import few, first_of, unlikely_head
-from ..shot.rig_controls import is_closed
+from ..shot.rig_controls import open_curves
 from ..shot.seat_notes import REVERSED
 from ..shot.stage import read_rigs, read_shot
 from ..skel.binding import bound_skeleton, geom_bind
@@ -195,7 +195,7 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
     border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
     found, notes, left = [], [], []
     every = find_curves(stage)
-    hair = [prim for prim in every if not is_closed(prim)] or every
+    hair = open_curves(every)
     closed, empty = [prim for prim in every if prim not in hair], without_points(hair)
     notes += few(
         [

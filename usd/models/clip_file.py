@@ -73,10 +73,10 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None, b
 
 def _on(character: Character, mover: StageRig, path: Path, notes: list[str] | None) -> Clip:
     """The clip of another file's skeleton on a character that has the same joints, though perhaps in other places or axes."""
-    clip, theirs, ours = mover.clip, mover.character.skeleton.bind, character.skeleton.bind
+    clip, ours = mover.clip, character.skeleton.bind
     apart = _apart(character, mover)
     if apart.max() <= ELSEWHERE * np.ptp(ours[:, 1, 3]):
-        return replace(clip, joints=clip.joints @ np.linalg.inv(theirs) @ ours)
+        return replace(clip, joints=clip.joints @ mover.character.inverse_bind @ ours)
     if notes is not None:
         furthest = leaf(character.skeleton.names[apart.argmax()])
         notes.append(

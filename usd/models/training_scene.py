@@ -26,7 +26,7 @@ from ..shot.attach import attach, of_another
 from ..shot.curve_ends import groom_between
 from ..shot.curves import find_curves, without_points
 from ..shot.notes import few, first_of, unfound, unlikely_head
-from ..shot.rig_controls import is_closed
+from ..shot.rig_controls import open_curves
 from ..shot.skeletons import read_each_rig
 from ..shot.stage import read_rigs
 from ..skel.binding import bound_skeleton
@@ -134,7 +134,7 @@ def _file(
     prims = find_curves(stage)
     if not prims:
         raise NeuralocksError(f"{source}: holds no groom (no BasisCurves prim); give a groom, or '{LIBRARY}'")
-    prims = [prim for prim in prims if not is_closed(prim)] or prims
+    prims = open_curves(prims)
     empty = without_points(prims)
     prims, brought = [prim for prim in prims if prim not in empty], None
     if stage.GetRootLayer() == rig.source.prim.GetStage().GetRootLayer():

@@ -15,9 +15,9 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
-from ..border.arrays import column_matrix
 from ..border.placement import Placement
 from ..skel.binding import bound_skeleton, geom_bind, joint_influences
+from ..skel.joints import JointSource
 from ..skel.stage_rig import StageRig
 from .alike import one_of_alike
 from .carrying import carried_by, carrying_joint, followed_joint, head_by_name, joint_shares, spread_over
@@ -111,19 +111,18 @@ def attach(
 
 
 def _between_binds(prim: Usd.Prim, rig: StageRig, placement: Placement) -> np.ndarray:
-    """From the bind space of a groom's own file to the rig's (4, 4), as authored: their bind poses tell, if its file has the skeleton,
-    too; its unit may have been brought by a transform above.
+    """From the bind space of a groom's own file to the rig's (4, 4): what brings its stage's space here or, where its file has the same
+    skeleton and their bind poses say so, nothing, because a transform above brings its unit.
     """
     if placement.brought is None:
         return np.eye(4)
-    skeleton = UsdSkel.Skeleton(prim.GetStage().GetPrimAtPath(rig.path))
-    names, binds = (
-        list(a.Get() or ()) if a else [] for a in (skeleton.GetJointsAttr(), skeleton.GetBindTransformsAttr())
-    )
-    name = rig.source.names[rig.character.head]
-    if name not in names or len(names) != len(binds):
+    skeleton = prim.GetStage().GetPrimAtPath(rig.path)
+    theirs = JointSource(skeleton) if skeleton and skeleton.IsA(UsdSkel.Skeleton) else None
+    if theirs is None or theirs.names != rig.source.names:
         return placement.brought
-    return rig.source.bind[rig.character.head] @ np.linalg.inv(column_matrix(binds[names.index(name)]))
+    ours, places = rig.source.bind[:, :3, 3], theirs.bind[:, :3, 3]
+    ways = (np.eye(4), placement.brought)
+    return min(ways, key=lambda way: np.abs(transformed(places, way) - ours).max())
 
 
 def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement, seated: bool) -> tuple[str, str] | None:

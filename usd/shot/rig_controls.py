@@ -17,6 +17,11 @@ def is_closed(prim: Usd.Prim) -> bool:
     return UsdGeom.BasisCurves(prim).GetWrapAttr().Get() == UsdGeom.Tokens.periodic
 
 
+def open_curves(prims: list[Usd.Prim]) -> list[Usd.Prim]:
+    """Those of some curves that are not closed; all of them if all are."""
+    return [prim for prim in prims if not is_closed(prim)] or prims
+
+
 def is_lone_guide(prim: Usd.Prim, rigs: Sequence[StageRig], placement: Placement) -> bool:
     """Whether a prim is one unbound curve of purpose guide that does not begin on skin. One that does may be a groom's guide: some
     tools make a prim for each.

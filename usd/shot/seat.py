@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pxr import Usd
 
-from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
@@ -139,10 +138,13 @@ def _on_faces(seat: Seat, roots: np.ndarray, others: list[np.ndarray]) -> Seat |
         middle = float(np.median(seat.skin.query(placed, NEAR)[0]))
         if middle <= seat.distance + UNSURE:  # faces take far longer to ask than points
             near.append(replace(seat, distance=middle, to_bind=to_bind, way=(True, place), roots=placed))
-    if not near or (surface := seat.rig.surface) is None or (off := _off_faces(surface, seat.roots)) < UNEVEN:
+    if not near or (surface := seat.rig.surface) is None:
         return None
-    best = min(near, key=lambda each: _off_faces(surface, each.roots))
-    return best if off >= SURELY * _off_faces(surface, best.roots) else None
+    off = _off_faces(surface.distance(seat.roots)[0])
+    if off < UNEVEN:
+        return None
+    left = [_off_faces(surface.distance(each.roots)[0]) for each in near]
+    return near[int(np.argmin(left))] if off >= SURELY * min(left) else None
 
 
 def _on_skin_at_rest(rig: StageRig, roots: np.ndarray, at_rest: np.ndarray) -> Seat | None:
@@ -152,15 +154,14 @@ def _on_skin_at_rest(rig: StageRig, roots: np.ndarray, at_rest: np.ndarray) -> S
     nearest = int(np.argmin(far))
     if not far[nearest] <= NEAR or rig.surface is None:
         return None
-    off = np.abs(rig.surface.distance(placed)[0])
-    if np.median(off) > (ON_FACES if len(placed) >= MANY else UNEVEN) or _off_faces(rig.surface, placed) > UNEVEN:
+    signed = rig.surface.distance(placed)[0]
+    if np.median(np.abs(signed)) > (ON_FACES if len(placed) >= MANY else UNEVEN) or _off_faces(signed) > UNEVEN:
         return None
     return Seat(far[nearest], rig, rig.meshes[nearest], at_rest, (True, 0), placed, rig.skins[nearest])
 
 
-def _off_faces(surface: Collider, points: np.ndarray) -> float:
-    """How far points (n, 3) are from lying on faces, or all at one distance from them, as hair that hovers does [m]."""
-    signed = surface.distance(points)[0]
+def _off_faces(signed: np.ndarray) -> float:
+    """How far points at signed distances (n,) [m] are from lying on faces, or all at one distance from them, as hair that hovers."""
     middle = np.median(signed)
     return float(np.median(np.abs(signed - middle)) + HOVER * abs(middle))
 

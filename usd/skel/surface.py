@@ -189,13 +189,13 @@ def _read(prim: Usd.Prim, source: JointSource, notes: list[str]) -> StageMesh | 
     if not len(points):
         notes.append(f"{path}: the mesh has no points; left out of the body")
         return None
+    if not np.isfinite(points).all():
+        raise NeuralocksError(f"{path}: the mesh's points hold NaN or infinity; repair it")
     if _moves(mesh.GetPointsAttr(), points):
         notes.append(
             f"{path}: its points move before skinning; hair is kept out of it as its points are at rest; export that motion as "
             "blend shapes"
         )
-    if not np.isfinite(points).all():
-        raise NeuralocksError(f"{path}: the mesh's points hold NaN or infinity; repair it")
     triangles = _triangles(mesh, path, len(points))
     if inside_out(points, triangles):
         notes.append(f"{path}: the mesh is inside out, its faces were turned round; flip its normals to fix this")

@@ -166,12 +166,12 @@ def test_motion_of_a_character_whose_head_has_another_name_needs_no_second_word(
 
 @pytest.mark.parametrize("character", [Recipe(bound="mesh"), Recipe(bound="mesh", unit=0.01, up="Z")])
 @pytest.mark.parametrize("groom", [{}, {"unit": 0.01}, {"up": "Z"}, {"unit": 0.01, "up": "Z"}])
-@pytest.mark.parametrize("bound", ["none", "own"])
-def test_a_groom_in_a_file_of_its_own_has_that_files_unit_and_axis(tmp_path, character, groom, bound):
+@pytest.mark.parametrize(("bound", "rigged"), [("none", False), ("own", False), ("own", True)])
+def test_a_groom_in_a_file_of_its_own_has_that_files_unit_and_axis(tmp_path, character, groom, bound, rigged):
     """Or the character's, as far as its file does not tell."""
     path, groom, told = write_shot(tmp_path, character), Recipe(bound=bound, **groom), []
     hair = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, groom, "groom")))
-    for name in {*hair.GetPrimAtPath("/Hero").nameChildren.keys()} - {"Hair"}:
+    for name in {*hair.GetPrimAtPath("/Hero").nameChildren.keys()} - ({"Hair", "Rig"} if rigged else {"Hair"}):
         del hair.GetPrimAtPath("/Hero").nameChildren[name]
     hair.Export(str(tmp_path / "alone.usda"))
     wanted = training_scene(path).grooms[0]

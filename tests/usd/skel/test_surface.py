@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
+from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.review.baked import read_baked
 from usd.review.inspect import inspect
@@ -268,3 +269,17 @@ def test_a_body_whose_points_move_before_skinning_is_told(tmp_path, swollen):
     stage.Save()
     said = [note for note in read_shot(path).notes if "move before skinning" in note]
     assert [note.startswith("/Hero/Skin: ") for note in said] == [True] * (swollen > 1e-3)
+
+
+def test_a_body_whose_points_are_not_finite_is_refused_without_a_warning(tmp_path):
+    """Also if they are samples."""
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin")).GetPointsAttr()
+    broken = np.array(points.Get())
+    broken[0] = np.inf
+    for code in (Usd.TimeCode.Default(), 1):
+        points.Set(Vt.Vec3fArray.FromNumpy(broken), code)
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="/Hero/Skin: the mesh's points hold NaN or infinity"):
+        read_shot(path)
