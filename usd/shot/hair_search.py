@@ -19,7 +19,7 @@ from .curve_ends import undrawn
 from .curves import left_as_they_are, without_points
 from .groom_notes import another_binds, another_carries, far_from_named, no_points, too_far, unusable_skeleton
 from .notes import few
-from .other_curves import other_hair
+from .other_curves import drawn_as_copies, other_hair
 from .others import Others
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 from .seat_notes import coarsely_placed
@@ -54,6 +54,7 @@ class HairSearch:
     ):
         self.rigs, self._head, self._notes = rigs, head, notes
         self._named, self._others, self._forced = named, others or None, forced
+        self._copied: list[str] = []
         self._far: list[str] = []
         self._unusable: list[str] = []
         self._controls: list[str] = []
@@ -67,7 +68,9 @@ class HairSearch:
     def no_hair(self) -> list[str]:
         """Why curves are not taken for hair: notes if other hair was found; if none was, the first one is the error."""
         others = [] if self._named else other_hair(self.rigs)
-        return few(others) + few(self._unusable) + few(self._far) + controls_left_out(self._controls)
+        return (
+            few(others) + few(self._unusable) + few(self._far) + controls_left_out(self._controls) + few(self._copied)
+        )
 
     def off_heads(self) -> list[str]:
         """The notes on hair that is not on a head, unless another note on it names its joint."""
@@ -93,7 +96,16 @@ class HairSearch:
         ]
 
     def filled(self, curves: list[Usd.Prim]) -> list[Usd.Prim]:
-        """The curves that have points and are not closed, with a note on the others."""
+        """The curves that have points, are not closed and are drawn where they are, with a note on the others.
+
+        Raises:
+            NeuralocksError: the user named curves that are drawn as copies elsewhere.
+        """
+        copied = [line for line in map(drawn_as_copies, curves) if line]
+        if copied and self._named:
+            raise NeuralocksError(copied[0])
+        self._copied += copied
+        curves = [prim for prim in curves if not drawn_as_copies(prim)]
         if not self._named:
             self._controls += [str(prim.GetPath()) for prim in curves if is_closed(prim)]
             curves = [prim for prim in curves if not is_closed(prim)]

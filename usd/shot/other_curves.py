@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair that a bake leaves out: curves of other types beside BasisCurves."""
+"""Hair that a bake leaves out: curves of other types beside BasisCurves, and curves that are only drawn as copies."""
 
 from collections.abc import Sequence
 
@@ -34,6 +34,19 @@ def other_hair(rigs: Sequence[StageRig]) -> list[str]:
         for prim in others[:MOST]
         if _looks_like_hair(prim, rigs)
     ]
+
+
+def drawn_as_copies(prim: Usd.Prim) -> str:
+    """The line on curves below a point instancer, which draws copies of them at its own places; '' for others."""
+    above = prim.GetParent()
+    while above and not above.IsA(UsdGeom.PointInstancer):
+        above = above.GetParent()
+    if not above:
+        return ""
+    return (
+        f"{prim.GetPath()}: is drawn as copies by the PointInstancer {above.GetPath()}, which no bake moves; if they are hair, make "
+        "each copy curves of its own"
+    )
 
 
 def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:

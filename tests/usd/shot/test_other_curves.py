@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair as NURBS or Hermite curves beside BasisCurves, which a bake leaves out."""
+"""Hair as NURBS or Hermite curves beside BasisCurves, or as copies by a point instancer, which a bake leaves out."""
 
 import numpy as np
 import pytest
@@ -44,6 +44,20 @@ def test_hair_of_other_kinds_is_told(shot, kind):
     curves(shot, kind, "/Hero/Guide", strands[:1])
     curves(shot, kind, "/Hero/Aura", strands + [0, 0.3, 0])
     assert len(told(shot, "/Hero/Guide")) == len(told(shot, "/Hero/Aura")) == 1
+
+
+def test_copies_by_a_point_instancer_are_told(shot):
+    UsdGeom.PointInstancer.Define(shot, "/Hero/Tufts").CreatePrototypesRel().SetTargets(["/Hero/Tufts/Kinds/Tuft"])
+    curves(shot, UsdGeom.BasisCurves, "/Hero/Tufts/Kinds/Tuft", strand_points(7, 12))
+    (line,) = told(shot, "/Hero/Tufts/Kinds/Tuft")
+    assert "drawn as copies by the PointInstancer /Hero/Tufts," in line and "make each copy curves of its own" in line
+    path = shot.GetRootLayer().realPath
+    with pytest.raises(NeuralocksError, match="PointInstancer /Hero/Tufts, which no bake moves"):
+        read_shot(path, ["/Hero/Tufts"])
+    shot.RemovePrim("/Hero/Hair")
+    shot.Save()
+    with pytest.raises(NeuralocksError, match="Kinds/Tuft: is drawn as copies"):
+        read_shot(path)
 
 
 @pytest.mark.parametrize("later", [False, True])
