@@ -49,7 +49,9 @@ _STEPS = {
 }
 """What a step of the history may consist of."""
 _CLIP = (
-    "the samples that a bake reads of a shot's motion: those of the skeleton's animation and of its parents' transforms. The "
+    "the samples that a bake reads of a shot's motion: those of the skeleton's animation, and of those of its parents' transforms the ones "
+    f"between two of these that are farther apart than {CLOSE:g} s, {STAND:g} s or more before the first, or after the last (all, if the "
+    "animation moves no joint). The "
     f"shot's range adds its end if that lies after the last of them, and its start if that lies {STAND:g} s or more before "
     "the first: the character stands still in between. Between two "
     f"samples farther apart than {CLOSE:g} s, each frame is a sample, too, as USD interpolates there: a frame is a whole time code, "
@@ -192,7 +194,8 @@ def _history(spec: BoundarySpec, place: str) -> str:
         f"{'; '.join(_STEPS[step] for step in steps)}. A bin is the mean over as many steps as `bins` says, newest first, times "
         "its `bin weights`. In a held pose all is 0. Between the samples of `clip`, p and R in the history follow a "
         "natural cubic spline through them, of the place and of the quaternion's components with continuous signs; `pose` and `gravity` are of the "
-        f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} In animation on twos to fours, whose poses are held for two to four samples each, "
+        f"pose that is drawn.{_BLOWS if linear == ['f_k'] else ''} In animation on twos to fours, whose poses (of the joints that are read; if these hold none in the world, as seen "
+        "from the upper chest) are held for two to four samples each, "
         "samples that repeat a pose are left out, and at their times t is that of the pose's first sample (between two samples, t goes linearly "
         "from one to the other; after the last one, on with time). A pose that shows for longer than "
         f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay (a bake looks at four poses in a row; this is an approximation: "
