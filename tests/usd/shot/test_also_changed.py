@@ -2,11 +2,14 @@
 """A character that is a reference to another one in the same shot takes over what a bake says of that one: a note tells it."""
 
 import pytest
-from pxr import Gf, Usd, UsdGeom, UsdSkel
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel
 
 from usd.baking.bake import bake
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair
+from usd.shot.also_changed import also_changed
+from usd.shot.curves import find_curves
+from usd.shot.stage import read_shot
 
 from ..rig_shots import model_for, small_shot
 from ..shots import Recipe, samples, write_shot
@@ -33,6 +36,28 @@ def test_hair_that_is_left_out_is_told_to_change(tmp_path, still_model, instance
     first, second = (samples(done.path, "points", at=2, prim=f"/{name}/Hair") for name in ("Hero", "Hero2"))
     assert (first == second).all()
     assert not any(told in note for note in bake(path, tmp_path / "both.usdc", still_model).notes)
+
+
+def test_one_of_two_instances_of_an_asset_changes_alone(tmp_path):
+    """USD composes what instances share at one of them, which stands for all. What the shot says below one in vain is told."""
+    asset = write_shot(tmp_path, Recipe(frames=3), "asset")
+    stage = Usd.Stage.CreateNew(str(tmp_path / "crowd.usda"))
+    for name in ("A", "B"):
+        instance = stage.DefinePrim(f"/{name}")
+        instance.GetReferences().AddReference(asset.name)
+        instance.SetInstanceable(True)
+    stage.Save()
+    for name in ("A", "B"):
+        (item,) = read_shot(tmp_path / "crowd.usda", [f"/{name}/Hair"]).grooms
+        assert not also_changed([item.prim], find_curves(item.prim.GetStage()))
+    Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/A/Hair").active = False
+    stage.Save()
+    for name in ("A", "B"):
+        (item,) = read_shot(tmp_path / "crowd.usda", [f"/{name}/Hair"]).grooms
+        notes = also_changed([item.prim], ())
+        assert len(notes) == (name == "A") and all(
+            "/A: is an instance, so what crowd.usda says of prims below it (/A/Hair" in note for note in notes
+        )
 
 
 def test_a_body_that_is_left_out_is_told_to_change(tmp_path):
