@@ -11,7 +11,15 @@ import numpy as np
 
 from neuralocks_core.character import levels
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import Mirrored, from_quaternion, inverses, rotation_part, sizes, to_quaternion
+from neuralocks_core.rotation import (
+    Mirrored,
+    from_parents,
+    from_quaternion,
+    inverses,
+    rotation_part,
+    sizes,
+    to_quaternion,
+)
 
 from .uneven import ROUNDED, carriable, nearest, sheared, uneven
 
@@ -74,18 +82,6 @@ def _matrices(translation, rotation, scale) -> np.ndarray:
     return result
 
 
-def _turned_back(similar: np.ndarray) -> np.ndarray:
-    """Inverses of transforms (..., 4, 4) that rotate, move and scale alike along all axes; a general inverse wakes BLAS threads for
-    each 4x4, which in Blender's Python takes a quarter of the time of playing the frames.
-    """
-    linear = similar[..., :3, :3]
-    result = np.zeros_like(similar)
-    result[..., :3, :3] = linear.swapaxes(-1, -2) / np.square(linear[..., :1]).sum(axis=-2, keepdims=True)
-    result[..., :3, 3:] = -result[..., :3, :3] @ similar[..., :3, 3:]
-    result[..., 3, 3] = 1
-    return result
-
-
 def _store(channels, rows: np.ndarray, joints: np.ndarray, parents: np.ndarray, evenly: bool = True) -> None:
     """Write translation, rotation and scale of some rows (T,) from world transforms (t, J, 4, 4), each relative to the
     parent as stored; all with one scale each, or not.
@@ -95,7 +91,7 @@ def _store(channels, rows: np.ndarray, joints: np.ndarray, parents: np.ndarray, 
     for level in levels(parents):
         local, above = joints[:, level], parents[level]
         if above[0] >= 0:
-            local = (_turned_back if evenly else inverses)(stored[:, above]) @ local
+            local = inverses(stored[:, above]) @ local
         if evenly:
             size = sizes(local)[..., None]
             turn = local[..., :3, :3] / size[..., None]
@@ -197,10 +193,7 @@ class Motion:
 
     def world(self) -> np.ndarray:
         """Joints (T, J, 4, 4) in Blender's world space, from the stored channels."""
-        joints = _matrices(self.translation, self.rotation, self.scale)
-        for level in levels(self.parents)[1:]:
-            joints[:, level] = joints[:, self.parents[level]] @ joints[:, level]
-        return joints
+        return from_parents(_matrices(self.translation, self.rotation, self.scale), self.parents)
 
     def gap(self) -> float:
         """How far the last pose is from the first [degrees]: largest turn of any joint relative to its parent. A loop has none."""

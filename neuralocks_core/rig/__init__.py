@@ -2,15 +2,13 @@
 """Rigged mesh hair: joint chains below the head, and the tiny network that turns them (paper section 4.4)."""
 
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import NoHairChains, find_chains
+from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
-from neuralocks_core.rig.rigging import HairRig, assemble_rig
+from neuralocks_core.rig.rigging import assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 __all__ = [
     "HairChains",
-    "HairRig",
-    "NoHairChains",
     "RigModel",
     "RigSampler",
     "SkinnedMesh",

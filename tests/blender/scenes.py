@@ -105,6 +105,15 @@ def body(rig):
     return skin
 
 
+def dancer(count: int = 60, *, skinned: bool = False, **strands):
+    """A rig that dances, with its hair, and with a body if wanted; its `hair` has these other arguments."""
+    rig = armature()
+    if skinned:
+        body(rig)
+    dance(rig)
+    return rig, hair(rig, count, **strands)
+
+
 def dance(rig, frames=(1, 24)) -> None:
     """Key frames: a head shake, a bow and a step."""
     first, last = frames

@@ -69,7 +69,7 @@ WRONG = {
     "word as loop": ({"loop": "no"}, "--loop 'no': must be True or False"),
     "number as velocities": ({"velocities": 0}, "--velocities 0: must be True or False"),
     "no velocities": ({"velocities": None}, "--velocities None: must be True or False"),
-    "list as joints": ({"joints": ["a"]}, "joints: .*'a'.* is not a dict"),
+    "list as joints": ({"joints": ["a"]}, "--joint .*'a'.*must be a dict"),
 }
 
 

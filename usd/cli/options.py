@@ -14,7 +14,9 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for a machine t
 Grooms = Annotated[
     list[str] | None, typer.Option("--groom", help="Prim path of a groom; repeat for more. All hair if left out.")
 ]
-Skeleton = Annotated[str | None, typer.Option("--skeleton", help="Prim path of the skeleton, if there are several.")]
+Skeleton = Annotated[
+    str | None, typer.Option("--skeleton", help="The skeleton, by path or name, if there are several.")
+]
 Head = Annotated[
     str | None, typer.Option("--head", help="The head joint, if its name does not tell; it carries unbound hair.")
 ]

@@ -123,13 +123,7 @@ def read_rigged_hairs(
     check_names("--chains", chains)
     stage, skeleton = open_stage(path), prim_path(skeleton, "skeleton")
     border = Border.of(stage)
-    prims = find_skeletons(stage)
-    if skeleton:
-        prims = [p for p in prims if str(p.GetPath()) == skeleton or p.GetName() == skeleton]
-        if len(prims) != 1:
-            raise NeuralocksError(
-                f"{skeleton}: {path} has no single such Skeleton; see neuralocks inspect for its prims"
-            )
+    prims = find_skeletons(stage, skeleton)
     if not prims:
         raise nothing_found(stage, Path(path), "Skeleton", "give a stage with a skinned character")
     given = {"all_shapes": all_shapes, "joints": joints, "cuts": cuts, "unbaked": unbaked}
@@ -251,12 +245,12 @@ def check_orients(source: StageRig, chains: HairChains) -> None:
         name = leaf(names[joint])
         if np.linalg.det(linear) * np.linalg.det(bind[source.character.head, :3, :3]) < 0:
             raise NeuralocksError(
-                f"{source.path}: hair joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"
+                f"{source.path}: joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"
             )
         scale = np.linalg.norm(linear, axis=0)
         if scale.max() > UNEVEN * scale.min():
             raise NeuralocksError(
-                f"{source.path}: hair joint '{name}' is unevenly scaled in bind pose; apply the scale in the rig"
+                f"{source.path}: joint '{name}' is unevenly scaled in bind pose; apply the scale in the rig"
             )
 
 

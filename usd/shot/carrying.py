@@ -115,8 +115,7 @@ def head_by_name(rig: StageRig) -> int | None:
 def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
     """Whether a joint below the head never moves relative to it."""
     joints = rig.clip.joints
-    relative = np.linalg.inv(joints[:, head]) @ joints[:, joint]
-    return bool(np.abs(relative - relative[0]).max() < 1e-4)
+    return _still(np.linalg.inv(joints[:, head]) @ joints[:, joint])
 
 
 def _humanoid(rig: StageRig, **head: str) -> Humanoid:

@@ -265,14 +265,7 @@ def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
 
 def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tuple[list[StageRig], list[str]]:
     """The skeletons that can be used, and the notes on those that cannot."""
-    if not isinstance(joints, dict | None):
-        raise NeuralocksError(f"joints: {joints!r} is not a dict; give one such as {{'left_upper_arm': 'arm_L'}}")
-    prims = find_skeletons(stage)
-    names = ", ".join(str(p.GetPath()) for p in prims[:5]) or "none"
-    if skeleton is not None:
-        prims = [p for p in prims if str(p.GetPath()) == skeleton]
-        if not prims:
-            raise NeuralocksError(f"{skeleton}: no such skeleton; the stage's skeletons are: {names}")
+    prims = find_skeletons(stage, skeleton)
     if not prims:
         raise no_skeleton(stage, path)
     rigs, errors = read_each_rig(stage, prims, border, head, joints=joints, **options)

@@ -21,7 +21,8 @@ ALONE = 4.0
 also before the step: so only the later sample counts, and the step takes a frame, as if each frame had a sample."""
 STAND = 0.1
 """If a shot begins at least this long [s] before its samples, the character stands until they begin. An exporter's range is often a
-frame or two wider than its samples: a character that stood before them would start with a blow."""
+frame or two wider than its samples: a character that stood before them would start with a blow. One whose first pose
+`holds_first` stands, however short."""
 
 
 def clip_codes(source: JointSource, border: Border) -> np.ndarray:
@@ -33,7 +34,8 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
         NeuralocksError: there are too many.
     """
     frame = border.frame
-    samples = source.keys.read((CLOSE + 1e-9) * border.rate, (STAND - 1e-9) * border.rate)
+    stand = 0.0 if source.holds_first else (STAND - 1e-9) * border.rate
+    samples = source.keys.read((CLOSE + 1e-9) * border.rate, stand)
     if not samples:
         return np.zeros(1)
     first, last = samples[0], samples[-1]
@@ -51,7 +53,7 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
     stage = source.prim.GetStage()
     if stage.HasAuthoredTimeCodeRange():
         # Exporters leave out samples in which nothing changes: what is held at either end of the shot is held.
-        start, end, stand = stage.GetStartTimeCode(), stage.GetEndTimeCode(), (STAND - 1e-9) * border.rate
+        start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
         start, end = start if first - start >= stand else first, max(end, last)
         if held(start, end, len(samples)):
             samples = [start, *samples, end]

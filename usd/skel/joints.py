@@ -117,6 +117,18 @@ class JointSource:
         return (min(codes), max(codes)) if codes else (0.0, 0.0)
 
     @property
+    def holds_first(self) -> bool:
+        """Whether its first pose is held until its first sample: writers that leave out samples in which nothing changes give what is
+        held at first as the default value, too.
+        """
+
+        def held(channel: Usd.Attribute) -> bool:
+            default, times = channel.Get(Usd.TimeCode.Default()), channel.GetTimeSamples()
+            return default is not None and len(times) > 1 and np.array_equal(default, channel.Get(times[0]))
+
+        return self._columns is not None and any(map(held, self._channels()))
+
+    @property
     def shape_names(self) -> tuple[str, ...]:
         """The blend shapes that the animation moves."""
         return () if self._animation is None else _names(self._animation.GetBlendShapesAttr())

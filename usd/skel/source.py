@@ -110,10 +110,23 @@ def read_rig(
     )
 
 
-def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
-    """Skeleton prims in stage order."""
-    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
-    return [prim for prim in every if prim.IsA(UsdSkel.Skeleton)]
+def find_skeletons(stage: Usd.Stage, wanted: str | None = None) -> list[Usd.Prim]:
+    """Skeleton prims in stage order; only the one `wanted` by its path, or by a name that no other has.
+
+    Raises:
+        NeuralocksError: there is no such skeleton, or there are several.
+    """
+    below = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    every = [prim for prim in below if prim.IsA(UsdSkel.Skeleton)]
+    if wanted is None:
+        return every
+    found = [prim for prim in every if wanted in (str(prim.GetPath()), prim.GetName())]
+    if len(found) != 1:
+        others, fact = (found, "several skeletons have this name") if found else (every, "no such skeleton")
+        names = ", ".join(str(prim.GetPath()) for prim in others[:5]) or "none"
+        more = f" and {len(others) - 5} more" if others[5:] else ""
+        raise NeuralocksError(f"{wanted}: {fact}; give the path of one of: {names}{more}")
+    return found
 
 
 def _humanoid(source: JointSource, by_hand: dict[str, str], skinned: np.ndarray) -> Humanoid:

@@ -14,7 +14,6 @@ from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import cores
 from neuralocks_core.training.rig.body import BodyPatch
-from neuralocks_core.training.rig.scratch import Scratch
 
 RANGE = np.radians([60.0, 80.0, 45.0])
 """Largest nod, turn and tilt of people's heads relative to the chest [rad]."""
@@ -26,7 +25,6 @@ _TOGETHER = 96
 """Points whose nearest body vertices are searched together: the distances compared stay in the processor's cache, which takes a
 third of the time of a tree query.
 """
-_scratch = Scratch()
 
 
 class PosePool:
@@ -150,7 +148,7 @@ def _nearest(points: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Which of the body's vertices, columns x, y, z, x.x of (4, n), is nearest to each of the points (V, 3)."""
     asked, nearest = np.ones((len(points), 4), np.float32), np.empty(len(points), int)
     asked[:, :3] = -2 * points
-    (products,) = _scratch.arrays((_TOGETHER, body.shape[1]))
+    products = np.empty((_TOGETHER, body.shape[1]), np.float32)
     for first in range(0, len(points), _TOGETHER):
         some = slice(first, first + _TOGETHER)
         np.matmul(asked[some], body, out=products[: len(asked[some])]).argmin(axis=1, out=nearest[some])

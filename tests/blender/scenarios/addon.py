@@ -124,10 +124,7 @@ def model_of_another_body(folder: Path) -> None:
 
 def hair_beside_its_character(_folder: Path) -> None:
     """Hair that lies far from the skin swings there: the panel says so at once, and not only a bake."""
-    rig = scenes.armature()
-    scenes.body(rig)
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 10)
+    rig, strands = scenes.dancer(10, skinned=True)
     for x, told in ((0.0, False), (2.0, True), (0.1, False)):
         strands.neuralocks_hair.live = False
         strands.location.x = x
@@ -143,9 +140,8 @@ def told_of_what_is_there(_folder: Path) -> None:
     """
     from dcc_addon.session import session
 
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 10)
+    rig, strands = scenes.dancer(10)
+    scene = bpy.context.scene
     make_live(rig, strands)
     bpy.ops.neuralocks.report_card()
     strands.neuralocks_hair.model = "/nowhere.neuralocks"

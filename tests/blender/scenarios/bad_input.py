@@ -21,9 +21,7 @@ def bad_input(folder: Path) -> None:
     headless = scenes.armature("Snake", (("a", "", (0, 0, 0), (0, 0, 1)), ("b", "a", (0, 0, 1), (0, 0, 2))))
     scene.neuralocks.armature = headless
     refused(operators.sample_motion, "Snake", "head")
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 10)
+    rig, strands = scenes.dancer(10)
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     own = strands.neuralocks_hair
     own.model = MODEL

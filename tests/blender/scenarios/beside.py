@@ -73,9 +73,7 @@ def prepared_once(_folder: Path) -> None:
 
 def prepared_beside(_folder: Path) -> None:
     """In a window, a thread prepares the hair: it is at rest until then, and as usual afterwards; Live cancels; a render waits."""
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 1500)
+    rig, strands = scenes.dancer(1500)
     make_live(rig, strands)
     shown = points_at(strands, 9)
     strands.neuralocks_hair.live = False
@@ -132,9 +130,7 @@ def loaded_meanwhile(folder: Path) -> None:
     from dcc_addon.operators.base import Stepwise
     from dcc_addon.session import session
 
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     make_live(rig, strands)
     shown = points_at(strands, 9)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
@@ -241,9 +237,7 @@ def sampled_beside(_folder: Path) -> None:
     from dcc_addon.scene import sampling
     from dcc_addon.session import session
 
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     make_live(rig, strands)
     shown, motion = points_at(strands, 9), session.rigs["Rig"].motion
 

@@ -19,9 +19,7 @@ def attached_again(folder: Path) -> None:
     """
     needs_usd()
     operators, here = bpy.ops.neuralocks, folder / "here"
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     here.mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(here / "shot.blend"))
     bpy.context.scene.neuralocks.output = "//cache\\hair.usdc"  # as chosen on Windows
@@ -163,9 +161,8 @@ def retimed_since(folder: Path) -> None:
     Until then, the cache stays in step with the body, plays the old motion, and stands still where that ends.
     """
     needs_usd()
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
+    scene = bpy.context.scene
     make_live(rig, strands)
     scene.neuralocks.output = str(folder / "hair.usdc")
 
@@ -371,9 +368,8 @@ def one_of_two_taken_off(folder: Path) -> None:
     needs_usd()
     if bpy.app.version < (4, 2):
         raise SkipTest("this Blender deletes no strands")
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 12)
+    rig, strands = scenes.dancer(12)
+    scene = bpy.context.scene
     make_live(rig, strands)
     twin = strands.copy()
     scene.collection.objects.link(twin)

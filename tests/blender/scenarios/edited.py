@@ -232,10 +232,8 @@ def hidden_prop(folder: Path) -> None:
 
 def hidden_armature(folder: Path) -> None:
     """For a character hidden by the scale of its armature, or of a parent, the message says so, and does not blame a bone."""
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.body(rig)
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20, skinned=True)
+    scene = bpy.context.scene
     make_live(rig, strands)
     holder = bpy.data.objects.new("Holder", None)
     scene.collection.objects.link(holder)

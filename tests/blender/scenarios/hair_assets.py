@@ -22,9 +22,7 @@ def resting_surface(folder: Path) -> None:
     """The switch of Blender's hair assets that uses the surface at rest is off while the hair is live or plays a cache, and is
     restored in every way of ending that, whatever the modifier's name is by then; what the artist had off stays off.
     """
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     wanted = {}
     for number, (label, value) in enumerate(
         [*zip(RESTING, (True, True), strict=True), (RESTING[0], False), ("On", True)]

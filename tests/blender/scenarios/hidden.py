@@ -92,9 +92,7 @@ def bodies_in_renders(_folder: Path) -> None:
 def _baked(out: Path, hang, hide) -> dict:
     """Points by frame of hair that is attached and hidden in some way."""
     scenes.empty()
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     hang(rig, strands)
     bpy.context.scene.frame_set(7)
     hide(strands)

@@ -21,9 +21,7 @@ def undo(folder: Path) -> None:
     def own():
         return bpy.data.objects["Hair"]
 
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     scene = bpy.context.scene
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     strands.neuralocks_hair.model = MODEL
@@ -89,9 +87,7 @@ def applied_and_undone(_folder: Path) -> None:
         lambda: bpy.ops.object.origin_set(type="ORIGIN_GEOMETRY"),
     ):
         scenes.empty()
-        rig = scenes.armature()
-        scenes.dance(rig)
-        strands = scenes.hair(rig, 20)
+        rig, strands = scenes.dancer(20)
         strands.rotation_euler, strands.scale = (0.1, 0.3, 0.5), (1.4, 1.4, 1.4)
         make_live(rig, strands)
         shown, groomed = points_at(strands, 9), rest()

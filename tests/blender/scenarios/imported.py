@@ -16,9 +16,7 @@ def imported_moving(folder: Path) -> None:
     """Hair of a character that was imported with its motion, whose curves have the shape of a moved frame, is told so; hair that plays a cache
     of this add-on has its rest shape.
     """
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     for name, told in (("Neuralocks Cache", False), ("MeshSequenceCache", True)):
         if strands.modifiers.new(name, "MESH_SEQUENCE_CACHE") is None:
             raise SkipTest("hair has no modifiers in this Blender")

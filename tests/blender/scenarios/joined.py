@@ -87,9 +87,7 @@ def root_at_the_origin(_folder: Path) -> None:
     """A point exactly at the origin of its object rests there, and is not mistaken for one without a rest shape."""
     from dcc_addon.scene import curves
 
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     root = curves.shown(strands.data)[0].copy()
     curves.write(strands.data, curves.shown(strands.data) - root)
     strands.location = root

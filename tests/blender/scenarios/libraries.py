@@ -154,9 +154,7 @@ def beside_the_file(folder: Path) -> None:
     library.mkdir()
     shots.mkdir()
     model = shutil.copy(MODEL, library / "mine.neuralocks")
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     make_live(rig, strands)
     bpy.ops.wm.save_as_mainfile(filepath=str(library / "library.blend"))
     strands.neuralocks_hair.model = "//mine.neuralocks"
@@ -192,9 +190,7 @@ def written_by_a_script(folder: Path) -> None:
     from dcc_addon.scene import curves
 
     file = str(folder / "library.blend")
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     groom = curves.points(strands.data)
     make_live(rig, strands)
     points_at(strands, 9)

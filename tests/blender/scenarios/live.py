@@ -21,9 +21,8 @@ def sampled_first(_folder: Path) -> None:
     def said(icon: str) -> bool:
         return any("Rig: its motion" in line for line in drawn(icon))
 
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 10)
+    rig, strands = scenes.dancer(10)
+    scene = bpy.context.scene
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     with patch("dcc_addon.unsampled.bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
         strands.neuralocks_hair.live = True
@@ -39,9 +38,7 @@ def rest_is_safe(folder: Path) -> None:
     """With Live off, the add-on off, or a file opened without it, the hair is as it was groomed."""
     import dcc_addon
 
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 50)
+    rig, strands = scenes.dancer(50)
     groomed = np.array([p.position for p in strands.data.points])
     make_live(rig, strands)
     moved = points_at(strands, 14)
@@ -77,9 +74,7 @@ def rest_is_safe(folder: Path) -> None:
 
 def saved_from_elsewhere(folder: Path) -> None:
     """Saving while another scene is shown leaves the hair of this one as it was."""
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     make_live(rig, strands)
     points_at(strands, 9)
 
@@ -94,9 +89,7 @@ def saved_from_elsewhere(folder: Path) -> None:
 
 def rendering(folder: Path) -> None:
     """A final render sees the hair of the viewport, frame by frame, and samples what is out of date."""
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 30)
+    rig, strands = scenes.dancer(30)
     make_live(rig, strands)
     shown = {f: points_at(strands, f) for f in (3, 4, 5)}
     scene = bpy.context.scene
@@ -190,9 +183,7 @@ def two_characters(_folder: Path) -> None:
 
 def deformer_added(_folder: Path) -> None:
     """A modifier that would move live hair a second time is off, whenever it is added, and on again afterwards."""
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     first = scenes.surface_deform(strands)
     make_live(rig, strands)
     before = points_at(strands, 9)

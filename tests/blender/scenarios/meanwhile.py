@@ -97,9 +97,8 @@ def edited_meanwhile(folder: Path) -> None:
     from dcc_addon.scene import curves, up_to_date
     from dcc_addon.session import session
 
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
+    scene = bpy.context.scene
     make_live(rig, strands)
     scene.frame_set(9)
 

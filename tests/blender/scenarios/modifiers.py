@@ -17,9 +17,7 @@ def deform_among_others(folder: Path) -> None:
     """In a user's own tree that multiplies strands and lets them follow the surface, the live view and a cache disable only the
     following; all of it comes back, also while the hair is edited.
     """
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     strands.data.surface, strands.data.surface_uv_map = scenes.body(rig), "UVMap"
     tree, source, target = geometry_nodes("Groom")
     deform, twice = (tree.nodes.new(f"GeometryNode{name}") for name in ("DeformCurvesOnSurface", "DuplicateElements"))
@@ -85,9 +83,7 @@ def left_out_of_the_file(folder: Path) -> None:
 
     from dcc_addon.operators.bake import NEURALOCKS_OT_bake
 
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 10)
+    rig, strands = scenes.dancer(10)
     make_live(rig, strands)
 
     def said() -> str:
@@ -113,9 +109,8 @@ def switched_over_time(folder: Path) -> None:
     from dcc_addon.scene.muting import off_meanwhile
     from dcc_addon.scene.up_to_date import notice
 
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
+    scene = bpy.context.scene
     strands.data.surface = scenes.body(rig)
     modifier, own = scenes.surface_deform(strands), strands.neuralocks_hair
     for frame, shown in ((1, False), (5, True)):

@@ -59,10 +59,7 @@ def one_result(folder: Path) -> None:
 
 def out_of_the_body(folder: Path) -> None:
     """Keep out of Body and a looped range: live equals the bake, and each makes a difference."""
-    rig = scenes.armature()
-    scenes.body(rig)
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 60, length=0.4)
+    rig, strands = scenes.dancer(60, length=0.4, skinned=True)
     make_live(rig, strands, resolve=False)
     free = {f: points_at(strands, f) for f in (2, 13, 24)}
     strands.neuralocks_hair.resolve = True
@@ -95,9 +92,7 @@ def put_elsewhere(folder: Path) -> None:
     """A character jumps 3 m aside from one frame to the next: its hair does not feel the jump, live or baked."""
     from dcc_addon.session import session
 
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 40)
+    rig, strands = scenes.dancer(40)
     make_live(rig, strands)
     unmoved = {f: points_at(strands, f) for f in (12, 24)}
     for frame, aside in ((1, 0), (12, 0), (13, 3), (24, 3)):
@@ -184,10 +179,7 @@ def shutter_at_the_ends(folder: Path) -> None:
 def blender_export(folder: Path) -> None:
     """A bake of the scene as Blender itself exports it equals the live view."""
     needs_usd()
-    rig = scenes.armature()
-    scenes.body(rig)
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 40)
+    rig, strands = scenes.dancer(40, skinned=True)
     make_live(rig, strands)
     _equal_when_exported(folder, strands)
 
@@ -272,10 +264,7 @@ def attached(folder: Path) -> None:
 
 def scaled_head(folder: Path) -> None:
     """A head that its bones scale, throughout or for a while, with hair parented to the bone or to the armature."""
-    rig = scenes.armature()
-    scenes.body(rig)
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 40)
+    rig, strands = scenes.dancer(40, skinned=True)
     for number, (bone, sizes) in enumerate((("head", (1.25, 1.25)), ("spine", (0.7, 1.3)))):
         for frame, size in zip((1, 24), sizes, strict=True):
             rig.pose.bones[bone].scale = (size, size, size)

@@ -123,9 +123,7 @@ def cached_in_a_shot(folder: Path) -> None:
     gave the hair instead; what moves the hair without it is on.
     """
     needs_usd()
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     deform, blur = scenes.surface_deform(strands).name, "Neuralocks Cache Blur"
     strands.data.attributes.new("velocity", "FLOAT_VECTOR", "POINT")
     make_live(rig, strands)

@@ -144,9 +144,8 @@ def seen_by_another_camera(_folder: Path) -> None:
 
 def between_frames(_folder: Path) -> None:
     """Sampling ends at the frame and fraction that were shown, also before frame 0, where Blender's fractions are negative."""
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 5)
+    rig, strands = scenes.dancer(5)
+    scene = bpy.context.scene
     make_live(rig, strands)
     for frame, fraction in ((-3, 0.25), (9, 0.3)):
         before, shown = points_at(strands, frame, fraction), (scene.frame_current, scene.frame_subframe)

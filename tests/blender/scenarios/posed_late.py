@@ -51,9 +51,8 @@ def rendered_late(folder: Path) -> None:
     """Blender renders a rig that is posed late differently from how it shows it, which is reported once; if the script poses it
     before the frame is evaluated, all is well.
     """
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 10)
+    rig, strands = scenes.dancer(10)
+    scene = bpy.context.scene
     make_live(rig, strands, resolve=False)
     scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(scene.camera)

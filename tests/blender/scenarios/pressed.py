@@ -15,9 +15,8 @@ def pressed(folder: Path) -> None:
     """Each takes events between two slices, and is done in the end; Esc leaves nothing half made, and the next press works."""
     from dcc_addon.session import session
 
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 10)
+    rig, strands = scenes.dancer(10)
+    scene = bpy.context.scene
     make_live(rig, strands)
     out = folder / "hair.usdc"
     scene.neuralocks.output = str(out)

@@ -70,9 +70,7 @@ def separated(_folder: Path) -> None:
     """Blender's own Separate leaves both parts live, although it then counts a user too many; really shared curves are refused."""
     if "separate" not in dir(bpy.ops.curves):
         raise SkipTest("this Blender separates no strands")
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     make_live(rig, strands)
     points_at(strands, 9)
     bpy.context.view_layer.objects.active = strands
@@ -159,9 +157,7 @@ def applied(_folder: Path) -> None:
         assert change is more or moved < 1e-5
 
     scenes.empty()
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     groom = np.array([point.position for point in strands.data.points])
     tree, source, target = geometry_nodes("Frizz")
     offset = tree.nodes.new("GeometryNodeSetPosition")

@@ -167,9 +167,8 @@ def own_velocities(folder: Path) -> None:
     """A groom keeps velocities that it has from a file, and no renderer blurs live or attached hair along them; they are back when
     the cache is removed.
     """
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
+    scene = bpy.context.scene
     stored = np.full(3 * len(strands.data.points), 7.0, np.float32)
     strands.data.attributes.new("velocity", "FLOAT_VECTOR", "POINT").data.foreach_set("vector", stored)
     deform = scenes.surface_deform(strands)  # with it, renderers ask for points within the shutter anyway
@@ -219,9 +218,8 @@ def by_parts(folder: Path) -> None:
     """A file is rendered in parts, as render farms do, and through the compositor of another scene, by a Blender that has
     just opened it: in all parts the hair is that of the whole; if hair cannot move, the console says so.
     """
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
+    scene = bpy.context.scene
     make_live(rig, strands)
     shown = {frame: points_at(strands, frame) for frame in (20, 21)}
     main = bpy.data.scenes.new("Main")
@@ -259,9 +257,8 @@ def through_strip(folder: Path) -> None:
     """An animation is rendered through the sequencer, with the strip of a scene that has live hair: the hair is as shown,
     and nothing is left on it.
     """
-    rig, scene = scenes.armature(), bpy.context.scene
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
+    scene = bpy.context.scene
     make_live(rig, strands)
     shown = {frame: points_at(strands, frame) for frame in (5, 6, 7)}
     got = {}

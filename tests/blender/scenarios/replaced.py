@@ -17,9 +17,7 @@ def later_groom(folder: Path) -> None:
     expected, file = [], str(folder / "groom.blend")
     for length in (0.4, 0.2):
         scenes.empty()
-        rig = scenes.armature()
-        scenes.dance(rig)
-        strands = scenes.hair(rig, 20, length=length)
+        rig, strands = scenes.dancer(20, length=length)
         make_live(rig, strands)
         expected.append(points_at(strands, 9))
         if length == 0.4:
@@ -43,9 +41,7 @@ def character_gone(_folder: Path) -> None:
     """When the character of live hair is deleted, the hair is at rest and told so at once; it is live again after Attach."""
     for by_script in (True, False):
         scenes.empty()
-        rig = scenes.armature()
-        scenes.dance(rig)
-        strands = scenes.hair(rig, 20)
+        rig, strands = scenes.dancer(20)
         rest = curves.points(strands.data)
         make_live(rig, strands)
         live = points_at(strands, 9)

@@ -23,9 +23,7 @@ def applied_to_other_points(_folder: Path) -> None:
     for tree in (_children, _frizz):
         for done in (_apply, _convert):
             scenes.empty()
-            rig = scenes.armature()
-            scenes.dance(rig)
-            strands = scenes.hair(rig, 20)
+            rig, strands = scenes.dancer(20)
             groom = curves.points(strands.data)
             strands.modifiers.new("Grown", "NODES").node_group = tree()
             make_live(rig, strands)
@@ -55,9 +53,7 @@ def applied_to_other_points(_folder: Path) -> None:
 
 def strands_after_a_modifier(_folder: Path) -> None:
     """Strands that are added to live hair after a modifier was removed are not taken as that modifier's work."""
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     if not hasattr(strands.data, "add_curves"):
         raise SkipTest("no strands can be added yet")
     modifier = strands.modifiers.new("Grown", "NODES")
@@ -79,9 +75,7 @@ def attribute_gone(_folder: Path) -> None:
     """Live hair continues, and has its groom, when the attribute is removed, renamed or converted by hand, or by an applied
     modifier.
     """
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20)
     groom = curves.points(strands.data)
     tree, source, target = geometry_nodes("Clean")
     node = tree.nodes.new("GeometryNodeRemoveAttribute")

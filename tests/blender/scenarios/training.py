@@ -245,10 +245,7 @@ def _in_training(folder: Path, notes=(), before: str = ""):
     training_job.CHILD, training_job.CHECK = child, check
     operator.training_python = lambda: shutil.which("python3") or sys.executable
     scenes.empty()
-    rig = scenes.armature()
-    scenes.body(rig)
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 20)
+    rig, strands = scenes.dancer(20, skinned=True)
     bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
     exported = folder / "exported"
@@ -280,10 +277,7 @@ def trained_for_real(folder: Path) -> None:
     trouble = problem(operator.training_python())
     if trouble:
         raise SkipTest(trouble)
-    rig = scenes.armature()
-    scenes.body(rig)
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 40)
+    rig, strands = scenes.dancer(40, skinned=True)
     scene = bpy.context.scene
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     scene.neuralocks.train_minutes = 0.05

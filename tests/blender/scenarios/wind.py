@@ -26,9 +26,7 @@ from tests.blender.panel import drawn
 
 def wind_in_strands(folder: Path) -> None:
     """Live, operator and Python call agree in a wind; it acts at once, and a calm gives back what was before."""
-    rig = scenes.armature()
-    scenes.dance(rig)
-    strands = scenes.hair(rig, 40)
+    rig, strands = scenes.dancer(40)
     make_live(rig, strands, motion=0.7)
     own, frames = rig.neuralocks_character, (20, 3, 12)
     calm = {f: points_at(strands, f) for f in frames}

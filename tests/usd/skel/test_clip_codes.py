@@ -71,6 +71,18 @@ def test_a_range_that_begins_a_frame_before_the_samples_is_no_stand(tmp_path, ra
     assert np.abs(other - plain).max() > 0.1
 
 
+def test_a_first_pose_that_is_the_default_value_too_is_held_from_the_start(tmp_path):
+    """Blender 5 leaves out samples in which nothing changes: a character that stands for one frame has no other mark."""
+    path = write_shot(tmp_path, Recipe(frames=9))
+    stage = Usd.Stage.Open(str(path))
+    stage.SetStartTimeCode(0)
+    turns = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation)).GetRotationsAttr()
+    for default, first in ((turns.Get(1.0), 0), (turns.Get(9.0), 1)):
+        turns.Set(default)
+        stage.Save()
+        assert read_shot(path).rigs[0].time_codes[0] == first
+
+
 def test_keys_of_what_stands_still_are_no_motion(tmp_path):
     """A parent or scales with the same value at all their keys, some before the motion and between its samples: otherwise the
     character would stand, and start with a blow. Later keys hold it, as without them.

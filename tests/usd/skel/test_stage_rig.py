@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom
 
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import StrandModel
 from usd.border.time_codes import time_codes
 from usd.shot.notes import out_of_range
 from usd.shot.stage import read_rigs, read_shot
+from usd.skel.source import find_skeletons
 
 from ..shots import Recipe, write_shot
 
@@ -124,3 +126,18 @@ def test_a_root_on_curves_that_go_on_is_not_said_to_stand_still(tmp_path):
         (root.GetRotateYOp() or root.AddRotateYOp()).GetAttr().SetSpline(spline)
         stage.GetRootLayer().Save()
         assert bool(out_of_range(read_rigs(path)[0], 1, 49)) == held
+
+
+def test_a_skeleton_is_chosen_by_path_or_by_a_name_of_its_own(tmp_path):
+    write_shot(tmp_path, Recipe(frames=0), "one")
+    stage = Usd.Stage.CreateInMemory()
+    for name in ("A", "B"):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(str(tmp_path / "one.usda"))
+    assert [str(p.GetPath()) for p in find_skeletons(stage)] == ["/A/Rig", "/B/Rig"]
+    assert [str(p.GetPath()) for p in find_skeletons(stage, "/B/Rig")] == ["/B/Rig"]
+    with pytest.raises(NeuralocksError, match="Rig: several skeletons have this name; .* of: /A/Rig, /B/Rig$"):
+        find_skeletons(stage, "Rig")
+    with pytest.raises(NeuralocksError, match="Neck: no such skeleton; .* of: /A/Rig, /B/Rig$"):
+        find_skeletons(stage, "Neck")
+    stage.RemovePrim("/A")
+    assert [str(p.GetPath()) for p in find_skeletons(stage, "Rig")] == ["/B/Rig"]
