@@ -14,6 +14,7 @@ from neuralocks_core.rotation import transformed
 from ..border.prim_paths import prim_paths
 from ..border.values import as_numbers
 from ..skel.binding import rest_primvar, rest_value
+from .recorded import recorded
 
 
 def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
@@ -82,6 +83,14 @@ def moment(prim: Usd.Prim) -> float | None:
     return float(points.GetTimeSamples()[0])
 
 
+def _begins_with_default(prim: Usd.Prim) -> bool:
+    """Whether the points of a moving cache, which is no bake of ours, are also those at the default time, as sparse writers put it."""
+    points = UsdGeom.BasisCurves(prim).GetPointsAttr()
+    if _kept(prim) is not None or recorded(prim) or not points.ValueMightBeTimeVarying():
+        return False
+    return np.array_equal(points.Get(Usd.TimeCode.Default()), points.Get(points.GetTimeSamples()[0]))
+
+
 def lone_sample(prim: Usd.Prim) -> list[float]:
     """The time code at which an exporter wrote points that do not move, if it wrote them as a sample."""
     points = UsdGeom.BasisCurves(prim).GetPointsAttr()
@@ -128,6 +137,11 @@ def read_groom(prim: Usd.Prim, to_bind: np.ndarray, notes: list[str]) -> Groom:
         notes.append(f"{path}: was exported from Blender while Live was on; primvars:{rest_copy.NAME} {fact}")
     if (when := moment(prim)) is not None:
         notes.append(f"{path}: has no points at the default time; those at time code {when:g} are its shape at rest")
+    elif _begins_with_default(prim):
+        notes.append(
+            f"{path}: its points change, and begin with those at the default time, which are taken as its shape at rest; if they are "
+            "moved already, export it as it was groomed (from Blender, after Remove Hair Cache)"
+        )
     counts = _steady_counts(prim)
     scale = float(np.cbrt(abs(np.linalg.det(to_bind[:3, :3]))))
     uv = _per_strand(prim, ("groom_root_uv", "surface_uv_coordinate", "st", "uv"), counts, 2)

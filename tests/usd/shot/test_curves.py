@@ -12,6 +12,7 @@ from neuralocks_core.rest_copy import NAME
 from usd.assets.importing import import_groom
 from usd.baking.bake import bake
 from usd.shot.curves import left_as_they_are, moment, read_groom
+from usd.shot.stage import read_shot
 
 from ...core.formats.groom_files import write_hair
 from ..shots import Recipe, samples, world_points, write_shot
@@ -222,3 +223,25 @@ def test_normals_are_said_to_stay_behind(name):
     assert left_as_they_are(curves.GetPrim()) == []
     curves.GetPrim().CreateAttribute(name, Sdf.ValueTypeNames.Normal3fArray).Set([(0, 0, 1)])
     assert left_as_they_are(curves.GetPrim())[0].startswith("/Ribbons: has normals")
+
+
+def test_a_cache_that_begins_with_its_default_points_is_told(tmp_path, still_model):
+    """As Blender 5 exports hair that plays a cache. A bake of ours has its groom as default, wherever it begins."""
+    path = write_shot(tmp_path, Recipe(frames=3))
+    told = "/Hero/Hair: its points change, and begin with those at the default time"
+
+    def notes(shot) -> list[str]:
+        return [note for note in read_shot(shot).notes if note.startswith(told)]
+
+    bake(path, tmp_path / "bake.usdc", still_model)
+    assert not notes(path) and not notes(tmp_path / "bake.usdc")
+    stage = Usd.Stage.Open(str(path))
+    points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
+    rest = np.array(points.Get())
+    for code, moved in ((1, 0.0), (2, 0.01)):
+        points.Set(Vt.Vec3fArray.FromNumpy(rest + np.float32(moved)), code)
+    stage.Save()
+    assert len(notes(path)) == 1
+    points.Set(Vt.Vec3fArray.FromNumpy(rest + np.float32(0.02)))
+    stage.Save()
+    assert not notes(path)
