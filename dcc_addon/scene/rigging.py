@@ -126,8 +126,11 @@ def _lists(owner) -> list:
 def _read(data) -> list:
     """What drivers read, and no animation writes, of anything but objects' places."""
     found, written = [], {}  # hundreds of drivers may read one rig
-    for target in (t for curve in data.drivers for v in curve.driver.variables for t in v.targets):
+    variables = [variable for curve in data.drivers for variable in curve.driver.variables]
+    for variable, target in [(each, target) for each in variables for target in each.targets]:
         path, owner = target.data_path, target.id
+        if variable.type == "CONTEXT_PROP":  # of the scene or the view layer that is shown
+            owner = bpy.context.scene if target.context_property == "ACTIVE_SCENE" else bpy.context.view_layer
         if not path or owner is None:
             continue
         if owner not in written:
