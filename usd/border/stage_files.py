@@ -2,7 +2,7 @@
 """USD files: opening them, refusing outputs that must not be overwritten, and writing them whole."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from pxr import Ar, Sdf, Tf, Usd
@@ -95,7 +95,8 @@ def check_layer_name(out: Path) -> None:
 
 
 def check_not_input(out: Path, stage: Usd.Stage) -> None:
-    """Refuse to write over a file that the stage is composed of, or may be: of another variant, or of what is not loaded.
+    """Refuse to write over a file that the stage is composed of, or may be: of another variant, of what is not loaded, or of a value
+    clip at another time.
 
     Raises:
         NeuralocksError: `out` is one of them, under any name.
@@ -110,6 +111,16 @@ def check_not_input(out: Path, stage: Usd.Stage) -> None:
                 raise NeuralocksError(
                     f"{out}: {layer.GetDisplayName()} refers to it, as a layer or in a variant or payload; choose another name"
                 )
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        if any(one_file(out, asset.resolvedPath) for asset in _clips(prim)):
+            raise NeuralocksError(f"{out}: is a value clip of {prim.GetPath()}; choose another name")
+
+
+def _clips(prim: Usd.Prim) -> Iterable[Sdf.AssetPath]:
+    """The files that a prim's value clips are in, opened or not."""
+    clips = Usd.ClipsAPI(prim)
+    sets = clips.GetClips() if prim.HasMetadata("clips") else {}
+    return [asset for name in sets for asset in clips.ComputeClipAssetPaths(name)]
 
 
 def check_not_over(out: Path, stage: Usd.Stage) -> None:

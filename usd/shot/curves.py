@@ -36,6 +36,8 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
         if not below:
             prim = stage.GetPrimAtPath(text)
             fact = f"is a {prim.GetTypeName() or 'prim'} without BasisCurves" if prim else "no such prim"
+            if prim and prim.IsInPrototype():
+                fact = "is what instances share"
             raise NeuralocksError(f"{text}: {fact}; the stage's grooms are: {_examples(every)}")
         chosen.update(below)
     return [prim for prim in every if prim in chosen]

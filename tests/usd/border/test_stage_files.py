@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""USD files that are written again while this process holds them open."""
+"""USD files that are written again while this process holds them open, and files that are read only at times."""
 
-from usd.border.stage_files import open_stage, write_stage
+import pytest
+from pxr import Sdf, Usd
+
+from neuralocks_core.errors import NeuralocksError
+from usd.border.stage_files import check_not_input, open_stage, write_stage
 
 
 def test_a_file_that_is_still_open_is_read_as_it_was_written_last(tmp_path):
@@ -12,3 +16,30 @@ def test_a_file_that_is_still_open_is_read_as_it_was_written_last(tmp_path):
         held.append(open_stage(path))
         assert [str(each.GetPath()) for each in held[-1].Traverse()] == [prim]
     assert held[0].GetPrimAtPath("/Two")
+
+
+@pytest.mark.parametrize("instance", [False, True])
+def test_a_value_clip_that_is_not_open_yet_is_not_written_over(tmp_path, instance):
+    clips = [tmp_path / f"hair.{number}.usda" for number in (1, 2)]
+    for path in clips:
+        write_stage(
+            path, lambda stage: stage.DefinePrim("/Hair").CreateAttribute("x", Sdf.ValueTypeNames.Float).Set(1, 1)
+        )
+
+    def author(stage: Usd.Stage) -> None:
+        prim = stage.DefinePrim("/Groom/Hair")
+        prim.CreateAttribute("x", Sdf.ValueTypeNames.Float)
+        played = Usd.ClipsAPI(prim)
+        played.SetClipAssetPaths([Sdf.AssetPath(f"./{path.name}") for path in clips])
+        played.SetClipPrimPath("/Hair")
+        played.SetClipActive([(1, 0), (21, 1)])
+        other = stage.DefinePrim("/Other")
+        other.GetReferences().AddInternalReference("/Groom")
+        other.SetInstanceable(instance)
+
+    write_stage(tmp_path / "shot.usda", author)
+    stage = open_stage(tmp_path / "shot.usda")
+    for path in clips:
+        with pytest.raises(NeuralocksError, match=f"{path.name}: is "):
+            check_not_input(path, stage)
+    check_not_input(tmp_path / "hair.3.usda", stage)

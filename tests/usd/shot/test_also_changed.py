@@ -4,6 +4,7 @@
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel
 
+from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair
@@ -50,6 +51,11 @@ def test_one_of_two_instances_of_an_asset_changes_alone(tmp_path):
     for name in ("A", "B"):
         (item,) = read_shot(tmp_path / "crowd.usda", [f"/{name}/Hair"]).grooms
         assert not also_changed([item.prim], find_curves(item.prim.GetStage()))
+    shared = stage.GetPrimAtPath("/A/Hair").GetPrimInPrototype().GetPath()
+    with pytest.raises(
+        NeuralocksError, match=f"{shared}: is what instances share; the stage's grooms are: /A/Hair, /B/Hair"
+    ):
+        find_curves(stage, [shared])
     Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/A/Hair").active = False
     stage.Save()
     for name in ("A", "B"):
