@@ -198,8 +198,9 @@ def _history(spec: BoundarySpec, place: str) -> str:
         "from the upper chest) are held for two to four samples each, "
         "samples that repeat a pose are left out, and at their times t is that of the pose's first sample (between two samples, t goes linearly "
         "from one to the other; after the last one, on with time). A pose that shows for longer than "
-        f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay (a bake looks at four poses in a row; this is an approximation: "
-        "where a stop meets held poses, hair was up to 4 mm off on twos, 7 on threes, 28 on fours). Before the first sample "
+        f"1/{1 / LONGEST:.0f} s is a stop, whose samples stay, but for the end of one that held poses follow: of its last m samples only the first "
+        "stays, m being how many the next pose has. (A bake looks at four poses in a row: three must be held, and each differ "
+        "clearly from the one before.) In a loop, the last pose, if it is held, counts at its last sample. Before the first sample "
         "the head moves in a straight line, with its velocity there, and does not turn; after the last it stands still. In a loop (`--loop`), "
         "t wraps round, with the head ahead by its path in each round, and the spline continues over the seam on both sides"
     )

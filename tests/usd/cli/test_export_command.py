@@ -24,7 +24,7 @@ def test_plain_onnx_with_its_description(tmp_path, model, capsys):
         assert (tmp_path / name).read_bytes() == model_file.read(model_file.shipped()).graphs[name]
         session = onnxruntime.InferenceSession(tmp_path / name, providers=["CPUExecutionProvider"])
         assert [i.name for i in session.get_inputs()] == list(graph["inputs"])
-    assert "up to 4 mm off on twos, 7 on threes, 28 on fours" in text, "how near the rule for stops comes to a bake"
+    assert "of its last m samples only the first stays" in text, "what a bake does where a stop meets held poses"
     assert description["boundary vector"]["length"] == description["graphs"]["frame.onnx"]["inputs"]["frame"][1]
     assert status("export", model, "-o", tmp_path) == 0, "its own files are replaced"
     assert (tmp_path / "tail.onnx").read_bytes() == model_file.read(model).graphs["tail.onnx"]
