@@ -31,7 +31,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
             _tell_misrendered(
                 armature.name_full,
                 f"hair may be wrong in the last render of scene '{scene.name}': it is rendered with other scenes that share the "
-                "character, but not the frame range, the frame rate or Samples; give them the same",
+                "character, but not the frame range, the frame rate, Time Stretching or Samples; give them the same",
             )
     world = reader.world(evaluated) @ sampled.trim
     row = sampled.motion.row(shown_frame(scene))

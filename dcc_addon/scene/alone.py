@@ -16,14 +16,14 @@ OF = "action"
 
 
 def keep_alone(data, others) -> str:
-    """Let the action of some animation data play beside strips that are about to be added as it does now; returns how it was set, as
-    JSON, empty if that stays.
+    """Let the action of some animation data, or one that it gets later, play beside strips that are about to be added as it does
+    without them; returns how it was set, as JSON, empty if that stays.
 
     Args:
         data: of the armature.
         others: names of the tracks that do not count, because they are about to be replaced.
     """
-    if data.action is None or _strips_play(data, others):
+    if _strips_play(data, others):
         return ""
     found = [getattr(data, name) for name in AS_ALONE]
     _set(data, AS_ALONE.values())

@@ -37,10 +37,11 @@ def begins_later(scene) -> bool:
 
 
 def timing_of(scene) -> tuple:
-    """What a sampling depends on in the scene: frames, sub-frames, rate, unit."""
+    """What a sampling depends on in the scene: frames, sub-frames, time stretching, rate, unit."""
     return (
         *frames_of(scene),
         scene.neuralocks.subframes,
+        scene.render.frame_map_new / scene.render.frame_map_old,
         round(scene.render.fps / scene.render.fps_base, 6),
         round(scene.unit_settings.scale_length, 9),
     )

@@ -113,7 +113,7 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
     for side in ("left", "right"):
         for part, joint in named_limbs(side, sides, keys, parents).items():
             put(f"{side}_{part}", joint, f"by name '{leaf(names[joint])}'")
-    named, reason = _find_head(names, sides, keys, parents, positions)
+    named, reason = _find_head(names, sides, keys, parents, positions, skinned)
     put("head", named, reason)
     if "head" not in joints:
         raise NoHead("skeleton: no joint is named like a head; name it with --head JOINT")
@@ -179,7 +179,7 @@ def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions, 
             put(name, joint, f"by its place, '{leaf(names[joint])}'")
 
 
-def _find_head(names, sides, keys, parents, positions):
+def _find_head(names, sides, keys, parents, positions, skinned):
     def score(i):
         key = keys[i]
         # XNALara's `head neck lower` is a neck, its `head neck upper` the head.
@@ -206,10 +206,11 @@ def _find_head(names, sides, keys, parents, positions):
         if children:
             return min(children, key=beside_head), f"child of the neck '{leaf(names[neck])}'"
     # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the head; an animal's begin
-    # with its tail.
+    # with its tail. Exports of these keep bones of other layers with the same numbers, which move no skin themselves.
     spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]
     if len(spine) >= 5:
-        best = max(spine, key=lambda i: (int("0" + re.search(r"\d{0,9}$", names[i])[0]), depth(i, parents)))
+        own = np.ones(len(names), bool) if skinned is None else skinned
+        best = max(spine, key=lambda i: (int("0" + re.search(r"\d{0,9}$", names[i])[0]), own[i], depth(i, parents)))
         return best, f"last joint of the spine '{leaf(names[best])}'"
     return None, ""
 

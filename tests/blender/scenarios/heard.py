@@ -143,6 +143,15 @@ def action_beside_keys(folder: Path) -> None:
         assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"}
         assert same() and is_put(*(since or quiet))
 
+    action, data.action = data.action, None
+    put(*quiet)
+    assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"} and is_put(1.0, "HOLD", "REPLACE"), (
+        "for the artist's next keys"
+    )
+    assert bpy.ops.neuralocks.remove_keys() == {"FINISHED"} and is_put(*quiet)
+    data.action = action
+    put(*since)
+
     muted.mute = False
     still = {frame: bones_at(rig, frame, body) for frame in still}
     assert bpy.ops.neuralocks.bake_keys() == {"FINISHED"}

@@ -179,6 +179,7 @@ def moved_hair(folder: Path) -> None:
     """A hair object that is moved makes the sampling stale, and the bake agrees again; stretched time changes nothing;
     objects that share their curves are refused, and neither is moved.
     """
+    from dcc_addon.scene.sampled_from import key_of
     from dcc_addon.session import session
 
     rig = scenes.armature()
@@ -191,6 +192,7 @@ def moved_hair(folder: Path) -> None:
     points_at(strands, 10)
     assert session.rigs["Rig"].stale
     scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    assert session.rigs["Rig"].key != key_of(rig, scene)
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     shown = {f: points_at(strands, f) for f in (4, 19)}
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "moved.usdc")) == {"FINISHED"}

@@ -141,6 +141,17 @@ def test_a_face_that_hangs_from_a_copy_of_the_head_is_on_the_head():
     assert of_head == {"head", "ORG_head", "ORG_face", "DEF_jaw", "DEF_head"}
 
 
+def test_of_joints_numbered_alike_the_one_that_moves_skin_is_the_head():
+    """Blender's export of deforming bones keeps the bones of other layers that these hang from."""
+    spine = "root\n DEF_spine\n  DEF_spine_001\n   DEF_spine_002\n    DEF_spine_003\n     DEF_spine_004\n"
+    paths, parents = rig(
+        f"{spine}      DEF_spine_006\n     ORG_spine_005\n      ORG_spine_006a\n       ORG_spine_006\n        DEF_jaw"
+    )
+    skinned = np.array(["DEF" in path.rpartition("/")[2] for path in paths])
+    found = [find_humanoid(paths, parents, skinned=each)["head"] for each in (None, skinned)]
+    assert [paths[head].rpartition("/")[2] for head in found] == ["ORG_spine_006", "DEF_spine_006"]
+
+
 def test_a_neck_numbered_like_the_spine_begins_above_the_shoulders():
     """Blender exports deforming bones alone, and the arms of a Rigify rig then hang from nothing."""
     paths, parents = rig(
