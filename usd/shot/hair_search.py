@@ -101,11 +101,11 @@ class HairSearch:
         Raises:
             NeuralocksError: the user named curves that are drawn as copies elsewhere.
         """
-        copied = [line for line in map(drawn_as_copies, curves) if line]
+        copied = {prim: line for prim in curves if (line := drawn_as_copies(prim))}
         if copied and self._named:
-            raise NeuralocksError(copied[0])
-        self._copied += copied
-        curves = [prim for prim in curves if not drawn_as_copies(prim)]
+            raise NeuralocksError(next(iter(copied.values())))
+        self._copied += copied.values()
+        curves = [prim for prim in curves if prim not in copied]
         if not self._named:
             self._controls += [str(prim.GetPath()) for prim in curves if is_closed(prim)]
             curves = [prim for prim in curves if not is_closed(prim)]

@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
@@ -37,11 +37,14 @@ def other_hair(rigs: Sequence[StageRig]) -> list[str]:
 
 
 def drawn_as_copies(prim: Usd.Prim) -> str:
-    """The line on curves below a point instancer, which draws copies of them at its own places; '' for others."""
+    """The line on curves below a point instancer, which draws copies of them at its own places; '' for others, and for those that it
+    copies together with their character.
+    """
     above = prim.GetParent()
     while above and not above.IsA(UsdGeom.PointInstancer):
         above = above.GetParent()
-    if not above:
+    below = Usd.PrimRange(above, Usd.TraverseInstanceProxies()) if above else ()
+    if not above or any(other.IsA(UsdSkel.Skeleton) for other in below):
         return ""
     return (
         f"{prim.GetPath()}: is drawn as copies by the PointInstancer {above.GetPath()}, which no bake moves; if they are hair, make "

@@ -46,6 +46,14 @@ def test_hair_of_other_kinds_is_told(shot, kind):
     assert len(told(shot, "/Hero/Guide")) == len(told(shot, "/Hero/Aura")) == 1
 
 
+def test_a_character_that_a_point_instancer_copies_keeps_its_hair(tmp_path):
+    path = write_shot(tmp_path, Recipe(nesting="/Crowd/Kinds/Hero"))
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.PointInstancer.Define(stage, "/Crowd").CreatePrototypesRel().SetTargets(["/Crowd/Kinds/Hero"])
+    stage.Save()
+    assert [item.path for item in read_shot(path).grooms] == ["/Crowd/Kinds/Hero/Hair"]
+
+
 def test_copies_by_a_point_instancer_are_told(shot):
     UsdGeom.PointInstancer.Define(shot, "/Hero/Tufts").CreatePrototypesRel().SetTargets(["/Hero/Tufts/Kinds/Tuft"])
     curves(shot, UsdGeom.BasisCurves, "/Hero/Tufts/Kinds/Tuft", strand_points(7, 12))
