@@ -5,7 +5,7 @@ shot that it overrides, and those below an instance that the shot overrides in v
 
 from collections.abc import Iterable, Iterator
 
-from pxr import Sdf, Usd
+from pxr import Pcp, Sdf, Usd
 
 
 def also_changed(prims: Iterable[Usd.Prim], every: Iterable[Usd.Prim]) -> list[str]:
@@ -29,29 +29,45 @@ def also_changed(prims: Iterable[Usd.Prim], every: Iterable[Usd.Prim]) -> list[s
 
 def _revived(prim: Usd.Prim) -> Iterator[str]:
     """A note for each instance around a prim below which the shot says something, which USD leaves out while it is an instance."""
-    stage = prim.GetStage()
     for above in prim.GetPath().GetPrefixes():
-        if stage.GetPrimAtPath(above).IsInstance():
-            specs = [(layer, layer.GetPrimAtPath(above)) for layer in stage.GetLayerStack(includeSessionLayers=False)]
-            for layer, spec in specs:
-                if spec and spec.nameChildren:
+        instance = prim.GetStage().GetPrimAtPath(above)
+        if not instance.IsInstance():
+            continue
+        for node in _nodes(instance):
+            if node.parent and not node.IsDueToAncestor():
+                continue  # what instances share
+            for layer in node.layerStack.layers:
+                if (spec := layer.GetPrimAtPath(node.path)) and (said := next(filter(_says, spec.nameChildren), None)):
                     yield (
-                        f"{above}: is an instance, so what {layer.GetDisplayName()} says of prims below it "
-                        f"({spec.nameChildren[0].path} ...) does not count; it does in the bake, which makes it a plain prim: remove it from "
-                        "the layer if that is not meant"
+                        f"{above}: is an instance, so what {layer.GetDisplayName()} says of prims below it ({said.path} ...) does not "
+                        "count; it does in the bake, which makes it a plain prim: remove it from the layer if that is not meant"
                     )
 
 
+def _says(spec: Sdf.PrimSpec) -> bool:
+    """Whether a prim's spec, or one below it, says more than that the prim is there."""
+    more = spec.specifier != Sdf.SpecifierOver or spec.properties or set(spec.ListInfoKeys()) - {"specifier"}
+    return bool(more) or any(map(_says, spec.nameChildren))
+
+
 def _composed_of(prim: Usd.Prim) -> Iterator[Sdf.Path]:
-    """The prims of the root layer and its sublayers that a prim is composed of."""
-    root = prim.GetStage().GetRootLayer()
-    while prim.IsInstanceProxy():
-        prim = prim.GetPrimInPrototype()
-    waiting = [
-        *prim.GetPrimIndex().rootNode.children
-    ]  # the root is the prim, or the instance whose turn it is to stand for all
+    """The prims of the root layer and its sublayers that a prim is composed of, by arcs of its own or of what it is in."""
+    stage, path = prim.GetStage(), prim.GetPath()
+    root = stage.GetRootLayer()
+    for above in path.GetPrefixes():
+        own = stage.GetPrimAtPath(above)
+        while own.IsInstanceProxy():
+            own = own.GetPrimInPrototype()
+        for node in _nodes(own):
+            # The first node of what instances share is at any one of them.
+            if node.parent and not node.IsDueToAncestor() and node.layerStack.identifier.rootLayer == root:
+                yield path.ReplacePrefix(above, node.path)
+
+
+def _nodes(prim: Usd.Prim) -> Iterator[Pcp.NodeRef]:
+    """All nodes of what a prim is composed of; the first one, its own, has no parent."""
+    waiting = [prim.GetPrimIndex().rootNode]
     while waiting:
         node = waiting.pop()
         waiting += node.children
-        if node.layerStack.identifier.rootLayer == root:
-            yield node.path
+        yield node

@@ -66,6 +66,34 @@ def test_one_of_two_instances_of_an_asset_changes_alone(tmp_path):
         )
 
 
+def test_a_set_is_asked_wherever_it_is_referenced(tmp_path):
+    """An instance in a set: another copy of the set takes over its bake, and what the set says below it in vain counts then."""
+    asset = write_shot(tmp_path, Recipe(frames=3), "asset")
+    inner = Usd.Stage.CreateNew(str(tmp_path / "set.usda"))
+    instance = inner.DefinePrim("/Set/A")
+    instance.GetReferences().AddReference(asset.name)
+    instance.SetInstanceable(True)
+    inner.DefinePrim("/Copy").GetReferences().AddInternalReference("/Set")
+    over = Sdf.CreatePrimInLayer(inner.GetRootLayer(), "/Set/A/Skin")
+    inner.Save()
+
+    def notes(stage, path) -> list[str]:
+        return also_changed([stage.GetPrimAtPath(path)], find_curves(stage))
+
+    for path, copies in (("/Set/A/Hair", ["/Copy/A/Hair: references"]), ("/Copy/A/Hair", [])):
+        for _ in range(8):  # USD composes what instances share at any one of them
+            said = notes(Usd.Stage.Open(inner.GetRootLayer().realPath), path)
+            assert [note[: len("/Copy/A/Hair: references")] for note in said] == copies, (
+                "an over that says nothing is not told"
+            )
+    over.active = False
+    inner.Save()
+    shot = Usd.Stage.CreateInMemory()
+    shot.DefinePrim("/World").GetReferences().AddReference(inner.GetRootLayer().realPath, "/Set")
+    (said,) = notes(shot, "/World/A/Hair")
+    assert said.startswith("/World/A: is an instance, so what set.usda says of prims below it (/Set/A/Skin")
+
+
 def test_a_body_that_is_left_out_is_told_to_change(tmp_path):
     path = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(path), dynamic=True)
