@@ -131,7 +131,8 @@ def _read(data) -> list:
         path, owner = target.data_path, target.id
         if variable.type == "CONTEXT_PROP":  # of the scene or the view layer that is shown
             owner = bpy.context.scene if target.context_property == "ACTIVE_SCENE" else bpy.context.view_layer
-        if not path or owner is None:
+        # What the frame is belongs to each frame, as in drivers that name it without a variable.
+        if not path or owner is None or isinstance(owner, bpy.types.Scene) and path.startswith("frame_"):
             continue
         if owner not in written:
             written[owner] = animated(getattr(owner, "animation_data", None))

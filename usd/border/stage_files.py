@@ -2,7 +2,8 @@
 """USD files: opening them, refusing outputs that must not be overwritten, and writing them whole."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from pxr import Ar, Sdf, Tf, Usd
@@ -116,11 +117,13 @@ def check_not_input(out: Path, stage: Usd.Stage) -> None:
             raise NeuralocksError(f"{out}: is a value clip of {prim.GetPath()}; choose another name")
 
 
-def _clips(prim: Usd.Prim) -> Iterable[Sdf.AssetPath]:
-    """The files that a prim's value clips are in, opened or not."""
+def _clips(prim: Usd.Prim) -> Iterator[Sdf.AssetPath]:
+    """The files that a prim's value clips are in, opened or not; none if what names them is damaged, as USD plays none then."""
     clips = Usd.ClipsAPI(prim)
     sets = clips.GetClips() if prim.HasMetadata("clips") else {}
-    return [asset for name in sets for asset in clips.ComputeClipAssetPaths(name)]
+    for name in sets:
+        with suppress(Tf.ErrorException):
+            yield from clips.ComputeClipAssetPaths(name)
 
 
 def check_not_over(out: Path, stage: Usd.Stage) -> None:

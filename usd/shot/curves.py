@@ -90,7 +90,12 @@ def _begins_with_default(prim: Usd.Prim) -> bool:
     points = UsdGeom.BasisCurves(prim).GetPointsAttr()
     if _kept(prim) is not None or recorded(prim) or not points.ValueMightBeTimeVarying():
         return False
-    return np.array_equal(points.Get(Usd.TimeCode.Default()), points.Get(points.GetTimeSamples()[0]))
+    times, default = points.GetTimeSamples(), points.Get(Usd.TimeCode.Default())
+    # Half of the samples may be of a stop: one in the middle and the last one are enough.
+    later = {times[len(times) // 2], times[-1]}
+    return np.array_equal(default, points.Get(times[0])) and any(
+        not np.array_equal(default, points.Get(time)) for time in later
+    )
 
 
 def lone_sample(prim: Usd.Prim) -> list[float]:

@@ -99,10 +99,10 @@ class HairSearch:
         """The curves that have points, are not closed and are drawn where they are, with a note on the others.
 
         Raises:
-            NeuralocksError: the user named curves that are drawn as copies elsewhere.
+            NeuralocksError: the user named curves of which all are drawn as copies elsewhere.
         """
-        copied = {prim: line for prim in curves if (line := drawn_as_copies(prim))}
-        if copied and self._named:
+        copied = drawn_as_copies(curves)
+        if copied and self._named and len(copied) == len(curves):
             raise NeuralocksError(next(iter(copied.values())))
         self._copied += copied.values()
         curves = [prim for prim in curves if prim not in copied]

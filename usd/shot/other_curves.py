@@ -36,20 +36,28 @@ def other_hair(rigs: Sequence[StageRig]) -> list[str]:
     ]
 
 
-def drawn_as_copies(prim: Usd.Prim) -> str:
-    """The line on curves below a point instancer, which draws copies of them at its own places; '' for others, and for those that it
-    copies together with their character.
+def drawn_as_copies(prims: Sequence[Usd.Prim]) -> dict[Usd.Prim, str]:
+    """The curves among these that are only drawn as copies, by a point instancer above them, with a line on each. Curves that it
+    copies together with their character are hair like any other.
     """
-    above = prim.GetParent()
-    while above and not above.IsA(UsdGeom.PointInstancer):
-        above = above.GetParent()
-    below = Usd.PrimRange(above, Usd.TraverseInstanceProxies()) if above else ()
-    if not above or any(other.IsA(UsdSkel.Skeleton) for other in below):
-        return ""
-    return (
-        f"{prim.GetPath()}: is drawn as copies by the PointInstancer {above.GetPath()}, which no bake moves; if they are hair, make "
-        "each copy curves of its own"
-    )
+    found, characters = {}, {}
+    for prim in prims:
+        above = prim.GetParent()
+        while above and not above.IsA(UsdGeom.PointInstancer):
+            above = above.GetParent()
+        if not above:
+            continue
+        kinds = UsdGeom.PointInstancer(above).GetPrototypesRel().GetTargets()
+        kind = next((path for path in kinds if prim.GetPath().HasPrefix(path)), prim.GetPath())
+        if kind not in characters:
+            below = Usd.PrimRange(prim.GetStage().GetPrimAtPath(kind), Usd.TraverseInstanceProxies())
+            characters[kind] = any(other.IsA(UsdSkel.Skeleton) for other in below)
+        if not characters[kind]:
+            found[prim] = (
+                f"{prim.GetPath()}: is drawn as copies by the PointInstancer {above.GetPath()}, which no bake moves; if they are hair, "
+                "make each copy curves of its own"
+            )
+    return found
 
 
 def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:

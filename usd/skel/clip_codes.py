@@ -2,6 +2,7 @@
 """At which time codes a skeleton's animation is read."""
 
 import numpy as np
+from pxr import Usd
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LARGEST_CLIP
@@ -21,8 +22,7 @@ ALONE = 4.0
 also before the step: so only the later sample counts, and the step takes a frame, as if each frame had a sample."""
 STAND = 0.1
 """If a shot begins at least this long [s] before its samples, the character stands until they begin. An exporter's range is often a
-frame or two wider than its samples: a character that stood before them would start with a blow. One whose first pose
-`holds_first` stands, however short."""
+frame or two wider than its samples: a character that stood before them would start with a blow."""
 
 
 def clip_codes(source: JointSource, border: Border) -> np.ndarray:
@@ -34,10 +34,11 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
         NeuralocksError: there are too many.
     """
     frame = border.frame
-    stand = 0.0 if source.holds_first else (STAND - 1e-9) * border.rate
+    stand = (STAND - 1e-9) * border.rate
     samples = source.keys.read((CLOSE + 1e-9) * border.rate, stand)
     if not samples:
         return np.zeros(1)
+    samples = sorted({*samples, *_held_from(source)})
     first, last = samples[0], samples[-1]
 
     def held(first: float, last: float, count: int) -> bool:
@@ -73,6 +74,31 @@ def clip_codes(source: JointSource, border: Border) -> np.ndarray:
     wide = np.diff(samples, append=samples[-1])[near - 1] > CLOSE * border.rate
     codes = np.unique(np.concatenate([frames[wide], samples]))
     return codes[np.diff(codes, append=np.inf) > SAME * frame]  # of a step's two samples the one after it
+
+
+def _held_from(source: JointSource) -> list[float]:
+    """The time code from which the first pose is held, if a writer that leaves out samples in which nothing changes has left it out.
+    Such writers give what is held at first as the default value, too, and their layer begins before the first sample.
+    """
+    begins, firsts = [], []
+    for channel in source.channels:
+        times = channel.GetTimeSamples()
+        first = channel.Get(times[0]) if times else None
+        if any(not np.array_equal(first, channel.Get(time)) for time in times[1:]):
+            default = channel.Get(Usd.TimeCode.Default())
+            if default is None or not np.array_equal(default, first):
+                return []
+            begins += _layer_start(channel)
+            firsts.append(times[0])
+    return [begin for begin in begins[:1] if begin < min(firsts)]
+
+
+def _layer_start(channel: Usd.Attribute) -> list[float]:
+    """Where the layer begins that holds an attribute's samples, in the stage's time codes, if it tells."""
+    for spec, offset in channel.GetPropertyStackWithLayerOffsets():
+        if spec.layer.GetNumTimeSamplesForPath(spec.path):
+            return [offset * spec.layer.startTimeCode] if spec.layer.HasStartTimeCode() else []
+    return []
 
 
 def _after_steps(samples: np.ndarray, frame: float) -> tuple[np.ndarray, np.ndarray]:

@@ -72,11 +72,8 @@ class JointSource:
     @cached_property
     def keys(self) -> Keys:
         """When the animation, and the parents if they move, have samples."""
-        joints, face = [], []
-        if self._animation is not None:
-            joints = self._channels() if self._columns is not None else ()
-            face = [self._animation.GetBlendShapeWeightsAttr()]
-        joints, face = ([(each.GetTimeSamples(), each.Get) for each in own] for own in (joints, face))
+        face = [] if self._animation is None else [self._animation.GetBlendShapeWeightsAttr()]
+        joints, face = ([(each.GetTimeSamples(), each.Get) for each in own] for own in (self.channels, face))
         return Keys.of(joints, [(self.placement.samples, self.placement.at)], face)
 
     @property
@@ -109,24 +106,16 @@ class JointSource:
         """Joints (J, 4, 4) in stage world space in the rest pose, which UsdSkel shows without an animation."""
         return self.placement.reference @ from_parents(self.rest, self.parents)
 
+    @property
+    def channels(self) -> tuple[Usd.Attribute, ...]:
+        """What moves the joints; nothing if UsdSkel shows the rest pose."""
+        return () if self._columns is None else self._channels()
+
     @cached_property
     def _keyed(self) -> tuple[float, float]:
         """First and last time code at which the animation has a sample of a joint: it holds its poses before and after."""
-        channels = () if self._columns is None else self._channels()
-        codes = [code for channel in channels for code in channel.GetTimeSamples()]
+        codes = [code for channel in self.channels for code in channel.GetTimeSamples()]
         return (min(codes), max(codes)) if codes else (0.0, 0.0)
-
-    @property
-    def holds_first(self) -> bool:
-        """Whether its first pose is held until its first sample: writers that leave out samples in which nothing changes give what is
-        held at first as the default value, too.
-        """
-
-        def held(channel: Usd.Attribute) -> bool:
-            default, times = channel.Get(Usd.TimeCode.Default()), channel.GetTimeSamples()
-            return default is not None and len(times) > 1 and np.array_equal(default, channel.Get(times[0]))
-
-        return self._columns is not None and any(map(held, self._channels()))
 
     @property
     def shape_names(self) -> tuple[str, ...]:

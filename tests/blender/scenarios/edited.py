@@ -177,8 +177,13 @@ def held_otherwise(_folder: Path) -> None:
         target.context_property, target.data_path = "ACTIVE_SCENE", '["shown"]'
         read.append((scene, "ACTIVE_SCENE", '["shown"]'))
     driver.expression = f"({' + '.join(v.name for v in driver.variables)}) * sin(frame) if 12 < frame < 17 else 0"
+    counted = driver.variables.new()
+    counted.name, counted.targets[0].id_type = "shown", "SCENE"
+    counted.targets[0].id, counted.targets[0].data_path = scene, "frame_current"
     make_live(rig, strands)
     seen = points_at(strands, 20)
+    notice(rig, scene)
+    assert not session.rigs["Rig"].stale, "which frame it is, is no edit"
 
     def edit(number: int) -> None:
         if number == 0:

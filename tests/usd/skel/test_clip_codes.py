@@ -71,16 +71,38 @@ def test_a_range_that_begins_a_frame_before_the_samples_is_no_stand(tmp_path, ra
     assert np.abs(other - plain).max() > 0.1
 
 
-def test_a_first_pose_that_is_the_default_value_too_is_held_from_the_start(tmp_path):
-    """Blender 5 leaves out samples in which nothing changes: a character that stands for one frame has no other mark."""
-    path = write_shot(tmp_path, Recipe(frames=9))
+def test_a_hold_that_was_left_out_is_found(tmp_path):
+    """Blender 5 leaves out samples in which nothing changes: only the default value and the range of its own layer tell that a
+    character stands for a frame. A shot that begins earlier, and scales that never change, tell nothing.
+    """
+    path = write_shot(tmp_path, Recipe(frames=9), "motion")
     stage = Usd.Stage.Open(str(path))
-    stage.SetStartTimeCode(0)
-    turns = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation)).GetRotationsAttr()
-    for default, first in ((turns.Get(1.0), 0), (turns.Get(9.0), 1)):
-        turns.Set(default)
+    animation = next(UsdSkel.Animation(p) for p in stage.Traverse() if p.IsA(UsdSkel.Animation))
+    moving = [animation.GetTranslationsAttr(), animation.GetRotationsAttr()]
+    firsts = [channel.Get(1.0) for channel in moving]
+    shot = tmp_path / "shot.usda"
+    shot.write_text(
+        "#usda 1.0\n(\n  metersPerUnit = 1\n  startTimeCode = -1\n  endTimeCode = 9\n  timeCodesPerSecond = 24\n"
+        "  subLayers = [@./motion.usda@]\n)\n"
+    )
+
+    def first_codes() -> list[float]:
         stage.Save()
-        assert read_shot(path).rigs[0].time_codes[0] == first
+        return [float(read_shot(each).rigs[0].time_codes[0]) for each in (path, shot)]
+
+    scales = animation.GetScalesAttr()
+    for code in (1, 2):
+        scales.Set(scales.Get(), code)
+    stage.SetStartTimeCode(0)
+    assert first_codes() == [1, 1]
+    for channel, first in zip(moving, firsts, strict=True):
+        channel.Set(first)
+    assert first_codes() == [0, 0]
+    stage.SetStartTimeCode(1)
+    assert first_codes() == [1, 1], "a range of the shot's own"
+    stage.SetStartTimeCode(0)
+    moving[1].Set(moving[1].Get(5.0))
+    assert first_codes() == [1, 1], "another default value"
 
 
 def test_keys_of_what_stands_still_are_no_motion(tmp_path):
