@@ -3,7 +3,8 @@
 
     python benchmarks/card.py MODEL [NAME ...]
 
-Each of the shipped models moves other hair: NAME is a row of the tables, a hairstyle or a groom; without any, all rows are its own.
+Each of the shipped models moves other hair: NAME is a row of the tables, a hairstyle or a groom. The model for all hair may move none of
+these.
 The card also says in words which hair the model does not get right: motion error over 0.6, position error over 5 % of
 length, sliders off the solver's effect by more than 30 %. Only the card changes; the graphs stay the same, byte for byte.
 `neuralocks inspect MODEL` prints it.
@@ -35,10 +36,10 @@ def main() -> None:
     print("\n".join(meta["report"]["falls short"]))
 
 
-def measured(text: str, names=()) -> dict:
+def measured(text: str, names=None) -> dict:
     """The card's part of the tables in a Markdown text; all rows, or only those with one of these names."""
     styles, grooms, sliders = (
-        {name: row for name, row in table(text, heading).items() if not names or name in names}
+        {name: row for name, row in table(text, heading).items() if names is None or name in names}
         for heading in (STYLES, GROOMS, SLIDERS)
     )
     styles, grooms = (
