@@ -46,8 +46,13 @@ def _revived(prim: Usd.Prim) -> Iterator[str]:
 
 def _says(spec: Sdf.PrimSpec) -> bool:
     """Whether a prim's spec, or one below it, says more than that the prim is there."""
-    more = spec.specifier != Sdf.SpecifierOver or spec.properties or set(spec.ListInfoKeys()) - {"specifier"}
-    return bool(more) or any(map(_says, spec.nameChildren))
+    waiting = [spec]
+    while waiting:
+        spec = waiting.pop()
+        if spec.specifier != Sdf.SpecifierOver or spec.properties or set(spec.ListInfoKeys()) - {"specifier"}:
+            return True
+        waiting += spec.nameChildren
+    return False
 
 
 def _composed_of(prim: Usd.Prim) -> Iterator[Sdf.Path]:

@@ -88,9 +88,9 @@ def moment(prim: Usd.Prim) -> float | None:
 def _begins_with_default(prim: Usd.Prim) -> bool:
     """Whether the points of a moving cache, which is no bake of ours, are also those at the default time, as sparse writers put it."""
     points = UsdGeom.BasisCurves(prim).GetPointsAttr()
-    if _kept(prim) is not None or recorded(prim) or not points.ValueMightBeTimeVarying():
-        return False
     times, default = points.GetTimeSamples(), points.Get(Usd.TimeCode.Default())
+    if _kept(prim) is not None or recorded(prim) or not times:
+        return False
     # Half of the samples may be of a stop: one in the middle and the last one are enough.
     later = {times[len(times) // 2], times[-1]}
     return np.array_equal(default, points.Get(times[0])) and any(
