@@ -2,13 +2,14 @@
 """The mean of a model and of one that started from it: often better than both, if a longer training with larger steps has
 left the valley of the first.
 
-    python benchmarks/mean_model.py MODEL BEGUN SHARE [--damping FACTOR] [--without GROOM ...] -o OUT
+    python benchmarks/mean_model.py MODEL BEGUN SHARE [--damping FACTOR] [--without GROOM ...] [--also OTHER GROOM ...] -o OUT
 
 SHARE is the share of BEGUN, from 0 to 1. Both share their strand codes, which stay. With `--damping`, MODEL is first made to
 take so many times the damping for what it is told: a model that learned from a solver whose steps damp, before it is mixed
 with one that did not. The card is that of BEGUN and says so, without the measurements of BEGUN. With `--without`, the card
 does not tell of the hair of some grooms, by their numbers in the training of BEGUN, from 0 on: for those that another shipped
-model moves better, so that hair like it does not get this one (`deformation/suited.py`).
+model moves better, so that hair like it does not get this one (`deformation/suited.py`). With `--also`, it tells of the hair of some
+grooms in the card of another model, too, which this one moves as well: hair that it began with, or in place of that model.
 """
 
 from __future__ import annotations
@@ -18,10 +19,12 @@ import math
 from copy import deepcopy
 from pathlib import Path
 
+import numpy as np
 import plain_errors  # noqa: F401
 import torch
 
 from neuralocks_core.materials import RANGES
+from neuralocks_core.strands.resemblance import KEPT, spread
 
 
 def main() -> None:
@@ -32,13 +35,16 @@ def main() -> None:
     parser.add_argument("share", type=float)
     parser.add_argument("--damping", type=float, default=1.0)
     parser.add_argument("--without", type=int, nargs="+", default=[], metavar="GROOM")
+    parser.add_argument("--also", nargs="+", action="append", default=[], metavar=("OTHER", "GROOM"))
     parser.add_argument("-o", "--out", type=Path, required=True)
     print(mean(**vars(parser.parse_args())))
 
 
-def mean(model: Path, begun: Path, share: float, damping: float, without: list[int], out: Path) -> Path:
+def mean(
+    model: Path, begun: Path, share: float, damping: float, without: list[int], also: list[list[str]], out: Path
+) -> Path:
     """Write the model whose weights are (1 - share) of `model`'s, at so many times its damping, and `share` of `begun`'s; its card
-    does not tell of the hair of the grooms `without`.
+    does not tell of the hair of the grooms `without`, and tells of those of other models in `also`.
     """
     from neuralocks_core import model as model_file
     from neuralocks_core.boundary_spec import BoundarySpec
@@ -63,11 +69,21 @@ def mean(model: Path, begun: Path, share: float, damping: float, without: list[i
             ours.lerp_(theirs, share)
     began = "those that it began with" + (f", at {damping:g} times their damping" if damping != 1 else "")
     training = {**meta["training"], "mean": f"{share:g} of these weights, {1 - share:g} of {began}"}
-    if without:
-        each = len(training["hair"]) // len(training["strands"])  # a card holds as many strands of each groom
-        training["hair"] = [row for i, row in enumerate(training["hair"]) if i // each not in without]
+    if without or also:
+        told = [rows for i, rows in enumerate(_grooms(training)) if i not in without]
+        for other, *chosen in also:
+            rows = _grooms(model_file.read(Path(other), "strands").meta["training"])
+            told += [rows[int(i)] for i in chosen]
+        each = KEPT // len(told)
+        training["hair"] = [row for rows in told for row in np.array(rows)[spread(len(rows), each)].tolist()]
     graphs = strand_graphs(Beginning(begun).coder(), first, meta["output"])
     return model_file.write(out, {**meta, "training": training, "report": {}}, graphs)
+
+
+def _grooms(training: dict) -> list[list[str]]:
+    """The strands that a card tells of each groom: as many of each."""
+    each = len(training["hair"]) // len(training["strands"])
+    return [training["hair"][i * each : (i + 1) * each] for i in range(len(training["strands"]))]
 
 
 if __name__ == "__main__":
