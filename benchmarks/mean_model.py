@@ -19,7 +19,6 @@ import math
 from copy import deepcopy
 from pathlib import Path
 
-import numpy as np
 import plain_errors  # noqa: F401
 import torch
 
@@ -75,7 +74,7 @@ def mean(
             rows = _grooms(model_file.read(Path(other), "strands").meta["training"])
             told += [rows[int(i)] for i in chosen]
         each = KEPT // len(told)
-        training["hair"] = [row for rows in told for row in np.array(rows)[spread(len(rows), each)].tolist()]
+        training["hair"] = [rows[i] for rows in told for i in spread(len(rows), each)]
     graphs = strand_graphs(Beginning(begun).coder(), first, meta["output"])
     return model_file.write(out, {**meta, "training": training, "report": {}}, graphs)
 

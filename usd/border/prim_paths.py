@@ -3,9 +3,12 @@
 
 from collections.abc import Iterable
 
-from pxr import Sdf
+from pxr import Sdf, Usd
 
 from neuralocks_core.errors import NeuralocksError
+
+SOME = 5
+"""Prims that a message names."""
 
 
 def prim_path(given, name: str) -> str | None:
@@ -20,6 +23,12 @@ def prim_path(given, name: str) -> str | None:
         raise NeuralocksError(f"{name}: {given!r} is not a prim path; give text such as /Hero/Hair, or an Sdf.Path")
     text = str(given)
     return text[:-1] if len(text) > 1 and text.endswith("/") else text
+
+
+def some_paths(prims: list[Usd.Prim], none: str = "none") -> str:
+    """Paths of the first SOME prims, and how many more there are; `none` if there are none."""
+    more = f" and {len(prims) - SOME} more" if len(prims) > SOME else ""
+    return (", ".join(str(prim.GetPath()) for prim in prims[:SOME]) or none) + more
 
 
 def prim_paths(given, name: str) -> list[str]:

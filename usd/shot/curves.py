@@ -11,10 +11,12 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.rotation import transformed
 
-from ..border.prim_paths import prim_paths
+from ..border.prim_paths import prim_paths, some_paths
 from ..border.values import as_numbers
 from ..skel.binding import rest_primvar, rest_value
 from .recorded import recorded
+
+NONE = "none (no BasisCurves)"
 
 
 def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
@@ -31,14 +33,14 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
     chosen = set()
     for text in prim_paths(wanted, "grooms"):
         if not Sdf.Path.IsValidPathString(text) or not text.startswith("/"):
-            raise NeuralocksError(f"{text}: not a prim path; give an absolute one such as {_examples(every)}")
+            raise NeuralocksError(f"{text}: not a prim path; give an absolute one such as {some_paths(every, NONE)}")
         below = [p for p in every if p.GetPath().HasPrefix(text)]
         if not below:
             prim = stage.GetPrimAtPath(text)
             fact = f"is a {prim.GetTypeName() or 'prim'} without BasisCurves" if prim else "no such prim"
             if prim and prim.IsInPrototype():
                 fact = "is what instances share"
-            raise NeuralocksError(f"{text}: {fact}; the stage's grooms are: {_examples(every)}")
+            raise NeuralocksError(f"{text}: {fact}; the stage's grooms are: {some_paths(every, NONE)}")
         chosen.update(below)
     return [prim for prim in every if prim in chosen]
 
@@ -288,12 +290,3 @@ def _per_strand(prim: Usd.Prim, names, counts: np.ndarray, width: int) -> np.nda
         if len(values) == strands:
             return values
     return None
-
-
-def _examples(prims) -> str:
-    paths = [str(p.GetPath()) for p in prims]
-    return (
-        ", ".join(paths[:5]) + (f" and {len(paths) - 5} more" if len(paths) > 5 else "")
-        if paths
-        else "none (no BasisCurves)"
-    )

@@ -9,6 +9,7 @@ from neuralocks_core.motion import LARGEST_CLIP
 
 from ..border.units import Border
 from .joints import JointSource
+from .keys import changes
 
 CLOSE = 1.5 / 24
 """Samples at most this far apart [s] count as one for every frame, at whatever rate the stage runs."""
@@ -83,10 +84,9 @@ def _held_from(source: JointSource) -> list[float]:
     begins, firsts = [], []
     for channel in source.channels:
         times = channel.GetTimeSamples()
-        first = channel.Get(times[0]) if times else None
-        if any(not np.array_equal(first, channel.Get(time)) for time in times[1:]):
+        if changes(times, channel.Get):
             default = channel.Get(Usd.TimeCode.Default())
-            if default is None or not np.array_equal(default, first):
+            if default is None or not np.array_equal(default, channel.Get(times[0])):
                 return []
             begins += _layer_start(channel)
             firsts.append(times[0])

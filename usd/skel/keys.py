@@ -30,9 +30,7 @@ class Keys:
         moving, still = [set() for _ in range(3)], set()
         for own, channels in zip(moving, (joints, parents, face)):
             for times, at in channels:
-                first = at(times[0]) if times else None
-                moves = any(not np.array_equal(first, at(time)) for time in times[1:])
-                (own if moves else still).update(times)
+                (own if changes(times, at) else still).update(times)
         every = set().union(*moving)
         last = max(every, default=-np.inf)
         every |= {time for time in still if time > last}
@@ -49,3 +47,9 @@ class Keys:
         gap = np.diff(body, prepend=-np.inf, append=np.inf)[after]
         apart = np.where(after == 0, body[0] - every >= stand, gap > close)
         return sorted({*self.body, *every[apart].tolist()})
+
+
+def changes(times: Sequence[float], at: Callable) -> bool:
+    """Whether a `Channel` has more than one value at its samples."""
+    first = at(times[0]) if times else None
+    return any(not np.array_equal(first, at(time)) for time in times[1:])

@@ -14,6 +14,7 @@ from neuralocks_core.errors import NeuralocksError, reworded
 from neuralocks_core.motion import Clip
 
 from ..border.amounts import joints_by_hand
+from ..border.prim_paths import some_paths
 from ..border.units import Border
 from .bind_world import to_bind_world
 from .blend_shapes import all_shares, knot_weights
@@ -123,9 +124,7 @@ def find_skeletons(stage: Usd.Stage, wanted: str | None = None) -> list[Usd.Prim
     found = [prim for prim in every if wanted in (str(prim.GetPath()), prim.GetName())]
     if len(found) != 1:
         others, fact = (found, "several skeletons have this name") if found else (every, "no such skeleton")
-        names = ", ".join(str(prim.GetPath()) for prim in others[:5]) or "none"
-        more = f" and {len(others) - 5} more" if others[5:] else ""
-        raise NeuralocksError(f"{wanted}: {fact}; give the path of one of: {names}{more}")
+        raise NeuralocksError(f"{wanted}: {fact}; give the path of one of: {some_paths(others)}")
     return found
 
 
