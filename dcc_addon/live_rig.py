@@ -10,7 +10,7 @@ from .models import model_path, stamp
 from .pose import pose
 from .scene import rotations
 from .scene.lively import lively
-from .scene.sampled_from import shown_frame
+from .scene.shown import shown_frame
 from .services.bones import LiveBones
 from .session import session
 from .unsampled import unsampled

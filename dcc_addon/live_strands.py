@@ -25,7 +25,7 @@ from .scene.muting import mute_deformers, unmute_deformers
 from .scene.paths import check_found
 from .scene.placing import world
 from .scene.riding import on_hair_bone
-from .scene.sampled_from import shown_frame
+from .scene.shown import shown_frame
 from .scene.watched import evaluated_for_itself
 from .scene.windows import drawing, layer_shown
 from .services import rig as rig_service

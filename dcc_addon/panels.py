@@ -10,9 +10,7 @@ from neuralocks_core.motion import LOOP_GAP
 from .hair_notes import hair_notes, unnamed_model
 from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
-from .scene import imported
-from .scene.actions import has_keys
-from .scene.attach import has_cache, retimed_since
+from .scene import actions, attach, imported
 from .scene.particles import waiting
 from .scene.paths import usual_output
 from .scene.sampled_from import begins_later, frames_of
@@ -22,6 +20,9 @@ from .services.sliders import SLIDERS
 from .session import session
 
 RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
+MOVED = (
+    "in this frame the head is not where it was when the hair was baked; if the animation was changed, press {} again"
+)
 LATER = (
     "it knows no motion before it. To render a part of a shot again, turn off Scene Range in the panel Bake, and name the "
     "whole shot there"
@@ -232,8 +233,10 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("neuralocks.bake_keys", text="Bake to Keyframes", icon="KEYINGSET")
         taking = row.row(align=True)
-        taking.enabled = has_keys(armature)
+        taking.enabled = actions.has_keys(armature)
         taking.operator("neuralocks.remove_keys", text="", icon="X")
+        if actions.moved_since(armature, context.scene):
+            words(layout, f"{armature.name_full}: {MOVED.format('Bake to Keyframes')}", "ERROR")
         column = layout.column(align=True)  # side by side, a sidebar of default width would cut them
         column.operator("neuralocks.export_skel", text="USD Animation", icon="EXPORT")
         column.operator("neuralocks.export_c", text="C Header", icon="FILE_SCRIPT")
@@ -261,10 +264,14 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
         row.operator("neuralocks.bake_attach", icon="LINKED")
         taking = row.row(align=True)
         hair = settings.hair
-        taking.enabled = hair is not None and (has_cache(hair) or bool(hair.neuralocks_hair.replaced))
+        taking.enabled = hair is not None and (attach.has_cache(hair) or bool(hair.neuralocks_hair.replaced))
         taking.operator("neuralocks.detach", text="", icon="X")
-        if hair is not None and not hair.neuralocks_hair.live and retimed_since(hair, context.scene):
+        if hair is None or hair.neuralocks_hair.live:
+            return
+        if attach.retimed_since(hair, context.scene):
             words(layout, f"{hair.name_full}: {RETIMED}", "ERROR")
+        elif attach.moved_since(hair, context.scene):
+            words(layout, f"{hair.name_full}: {MOVED.format('Bake and Attach')}", "ERROR")
 
 
 def findings(armature) -> tuple[list[str], str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from . import alone, rotations
+from . import alone, as_baked, rotations
 from .animated import animated
 from .lookup import identified, identity
 from .relations import found_anew
@@ -60,6 +60,7 @@ def bake_keys(armature, bones, hair: tuple[np.ndarray, np.ndarray], own: tuple[n
     _strip(data, BEFORE + ending, below)
     action = _action(armature, f"{armature.name} Hair", modes, *hair)
     action[KEPT], action[ALONE] = before, alone.keep_alone(data, HAIR)
+    as_baked.remember(action, armature)
     # If tracks are deleted by hand, the first bake knows the artist's own rotations.
     settings.keys_kept = rotations.joined(before, older[0])
     settings.keys_alone = older[1] or action[ALONE]
@@ -137,6 +138,11 @@ def has_keys(armature) -> bool:
     # If the artist renamed the track, it plays on, and is the artist's.
     playing = any(strip.action and KEPT in strip.action for strip in strips)
     return bool(armature.neuralocks_character.keys_kept) and not playing
+
+
+def moved_since(armature, scene) -> bool:
+    """Whether the head is elsewhere in the shown frame than when hair keys that play were baked."""
+    return any(as_baked.moved_since(action, armature, scene) for action in _actions(armature, playing=True))
 
 
 def beside_others(armature) -> bool:

@@ -8,7 +8,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
-from . import blur, cached_strands
+from . import as_baked, blur, cached_strands
 from .muting import CACHE as MODIFIER
 from .muting import mute_deformers, off_meanwhile, unmute_deformers
 from .paths import full
@@ -65,6 +65,13 @@ def retimed_since(thing, scene) -> bool:
     return stretch != _in_step(scene) or rate != _rate(scene)
 
 
+def moved_since(thing, scene) -> bool:
+    """Whether the head is elsewhere in the shown frame than when the cache of an object was baked."""
+    cache = thing.modifiers[MODIFIER].cache_file if has_cache(thing) else None
+    armature = thing.neuralocks_hair.armature
+    return cache is not None and armature is not None and as_baked.moved_since(cache, armature, scene)
+
+
 def players(path: str) -> list:
     """Hair objects that play the USD file `path`."""
     return [
@@ -96,6 +103,7 @@ def renew(path: str, prims: dict[str, str], scene) -> None:
         if modifier.object_path != prim:
             modifier.object_path = prim
         blur.attach(hair)
+        as_baked.remember(modifier.cache_file, hair.neuralocks_hair.armature)
     caches = {hair.modifiers[MODIFIER].cache_file for hair in playing}
     for cache in caches:
         _follow_time(cache, scene)
@@ -114,6 +122,7 @@ def attach(hair, path: str, prim: str, scene) -> None:
     read_again([cache])
     cache.scale = 1.0
     _follow_time(cache, scene)
+    as_baked.remember(cache, hair.neuralocks_hair.armature)
     modifier = hair.modifiers.get(MODIFIER) or hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")
     modifier.show_viewport = modifier.show_render = True
     modifier.cache_file = cache

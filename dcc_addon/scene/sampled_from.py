@@ -8,13 +8,6 @@ from .carried import bodies_of, hairs_of
 from .rigging import posture, reached, rigging
 
 
-def shown_frame(scene) -> float:
-    """The frame that is shown, with its fraction, as the timeline counts; Blender's `frame_current_final` counts
-    stretched time.
-    """
-    return scene.frame_current + scene.frame_subframe
-
-
 def frames_of(scene) -> tuple[int, int]:
     """First and last frame to sample: those of the scene, and those that the panel names for the bake, so that view and bake
     remember the same past. Without a window, also those that the file had when it was opened: a render farm gives each machine a

@@ -27,7 +27,8 @@ from .layers import graph_of, layer_of, working_in
 from .lookup import find, named
 from .placing import world
 from .relations import found_anew
-from .sampled_from import frames_of, key_of, moved_by, posture_of, rigging_of, shown_frame
+from .sampled_from import frames_of, key_of, moved_by, posture_of, rigging_of
+from .shown import shown_frame
 from .stepping import step, stepping
 from .watched import watched
 

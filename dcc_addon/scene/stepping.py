@@ -9,6 +9,7 @@ import numpy as np
 from ..session import session
 from . import actions, rotations
 from .lookup import find
+from .shown import shown_frame
 from .unkeyed import Unkeyed
 
 
@@ -27,7 +28,7 @@ class stepping:
         self._scene = scene
 
     def __enter__(self):
-        self._frame = self._scene.frame_current + self._scene.frame_subframe  # before frame 0, the fraction is negative
+        self._frame = shown_frame(self._scene)  # before frame 0, the fraction is negative
         self._unkeyed = Unkeyed(self._scene)
         self._camera = self._scene.camera and self._scene.camera.name_full
         self._live = {}

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at
+from tests.blender.checks import SAME, apart, baked_points, give_bone_model, make_live, messages, needs_usd, points_at
 from tests.blender.panel import drawn
 
 
@@ -199,6 +199,58 @@ def retimed_since(folder: Path) -> None:
     strands.neuralocks_hair.live = False
     assert told()
     assert bpy.ops.neuralocks.detach() == {"FINISHED"} and not told()
+
+
+def moved_since(folder: Path) -> None:
+    """If the animation changes after hair was attached, or its bones were keyed, a note says so in each frame in which the head is
+    elsewhere, also when the file is opened again, until the hair is baked anew.
+    """
+    needs_usd()
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    scenes.body(rig)
+    strands = scenes.hair(rig, 20)
+    strands.neuralocks_hair.armature = rig
+    give_bone_model(rig, folder)
+    operators, scene = bpy.ops.neuralocks, bpy.context.scene
+    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    scene.neuralocks.output = str(folder / "hair.usdc")
+
+    def told(*frames) -> list:
+        found = []
+        for frame in frames:
+            bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
+            said = " ".join(drawn())
+            assert said.count("the head is not where it was") == said.count("if the animation was changed, press"), said
+            found.append([f"press {name} again" in said for name in ("Bake and Attach", "Bake to Keyframes")])
+        return found
+
+    def key(turned: float):
+        head = bpy.data.objects[rig_name].pose.bones["head"]
+        head.rotation_euler[1] += turned
+        head.keyframe_insert("rotation_euler", frame=bpy.context.scene.frame_current)
+
+    rig_name, neither, both = rig.name, [False, False], [True, True]
+    assert operators.bake_attach() == operators.bake_keys() == {"FINISHED"}
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    for _ in range(2):
+        assert told(1, 10, 10.5, 24, 30) == [neither] * 5
+        bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    bpy.context.scene.frame_set(10)
+    key(0.1)
+    assert told(1, 10, 10.5, 24, 30) == [neither, both, neither, neither, neither]
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    assert told(10, 24) == [both, neither]
+    bpy.data.objects[rig_name].hide_set(True)  # Blender does not pose it, so nothing is known
+    assert told(10) == [neither]
+    bpy.data.objects[rig_name].hide_set(False)
+    assert operators.bake_attach() == {"FINISHED"} and told(10) == [[False, True]]
+    assert operators.bake_keys() == {"FINISHED"} and told(10) == [neither]
+    bpy.context.scene.frame_set(10)
+    key(0.1)
+    assert told(10) == [both]
+    assert operators.detach() == operators.remove_keys() == {"FINISHED"} and told(10) == [neither]
 
 
 def drawn_alike(folder: Path) -> None:
