@@ -180,6 +180,15 @@ def test_parts_in_one_unknown_unit_keep_together(tmp_path):
     assert told.startswith(f"{files[0]}, {files[1]}: do not state their unit; took 1 mm, by which the scalp is ")
 
 
+def test_numbers_of_files_are_in_the_names_of_prims(tmp_path):
+    """A prim's name cannot begin with one, and hair 1 and hair 2 were told apart by nothing but their order."""
+    files = [put(tmp_path, f"{name}.tfx", tressfx_text(np.eye(4, 3), [2, 2])) for name in ("12", "3 braid")]
+    out = tmp_path / "both.usda"
+    import_groom(files, out, "m")
+    stage = Usd.Stage.Open(str(out))
+    assert [prim.GetName() for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves)] == ["_12", "_3_braid"]
+
+
 def test_hair_that_a_skeleton_carries_is_imported_where_skinning_shows_it(tmp_path):
     """Its own space is tied to the skeleton by the geomBindTransform; the prim's transform does not count."""
     rest = strand_points(6, 4).reshape(-1, 3)
