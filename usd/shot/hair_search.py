@@ -101,7 +101,8 @@ class HairSearch:
         Raises:
             NeuralocksError: the user named curves of which all are drawn as copies elsewhere.
         """
-        copied = drawn_as_copies(curves)
+        copied, moving = drawn_as_copies(curves)
+        self._notes += few(moving)
         if copied and self._named and len(copied) == len(curves):
             raise NeuralocksError(next(iter(copied.values())))
         self._copied += copied.values()

@@ -12,6 +12,7 @@ from neuralocks_core.rotation import transformed
 from ..border.placement import Placement, Unplaced
 from ..border.values import as_numbers
 from ..skel.binding import rest_value
+from ..skel.keys import changes
 from ..skel.stage_rig import StageRig
 from .attach import REACH
 from .seat import NEAR
@@ -36,11 +37,11 @@ def other_hair(rigs: Sequence[StageRig]) -> list[str]:
     ]
 
 
-def drawn_as_copies(prims: Sequence[Usd.Prim]) -> dict[Usd.Prim, str]:
+def drawn_as_copies(prims: Sequence[Usd.Prim]) -> tuple[dict[Usd.Prim, str], list[str]]:
     """The curves among these that are only drawn as copies, by a point instancer above them, with a line on each. Curves that it
-    copies together with their character are hair like any other.
+    copies together with their character are hair like any other, with a note on each instancer that moves its copies.
     """
-    found, characters = {}, {}
+    found, moved, characters = {}, {}, {}
     for prim in prims:
         above = prim.GetParent()
         while above and not above.IsA(UsdGeom.PointInstancer):
@@ -57,7 +58,22 @@ def drawn_as_copies(prims: Sequence[Usd.Prim]) -> dict[Usd.Prim, str]:
                 f"{prim.GetPath()}: is drawn as copies by the PointInstancer {above.GetPath()}, which no bake moves; if they are hair, "
                 "make each copy curves of its own"
             )
-    return found
+        elif above not in moved:
+            moved[above] = _moves_copies(UsdGeom.PointInstancer(above))
+    return found, [
+        f"{above.GetPath()}: moves its copies of a character over time, which their hair does not feel; if they walk, make each a "
+        "character of its own"
+        for above in moved
+        if moved[above]
+    ]
+
+
+def _moves_copies(instancer: UsdGeom.PointInstancer) -> bool:
+    places = instancer.GetPositionsAttr(), instancer.GetOrientationsAttr(), instancer.GetOrientationsfAttr()
+    speeds = instancer.GetVelocitiesAttr(), instancer.GetAngularVelocitiesAttr()
+    return any(changes(attribute.GetTimeSamples(), attribute.Get) for attribute in places) or any(
+        np.any(attribute.Get(Usd.TimeCode.EarliestTime()) or 0) for attribute in speeds
+    )
 
 
 def _looks_like_hair(prim: Usd.Prim, rigs: Sequence[StageRig]) -> bool:

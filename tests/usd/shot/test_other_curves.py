@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom, Vt
+from pxr import Gf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.review.inspect import inspect
@@ -52,6 +52,23 @@ def test_a_character_that_a_point_instancer_copies_keeps_its_hair(tmp_path):
     UsdGeom.PointInstancer.Define(stage, "/Crowd").CreatePrototypesRel().SetTargets(["/Crowd/Kinds/Hero"])
     stage.Save()
     assert [item.path for item in read_shot(path).grooms] == ["/Crowd/Kinds/Hero/Hair"]
+
+
+@pytest.mark.parametrize("moved", ["positions", "orientations", "velocities", ""])
+def test_a_crowd_that_a_point_instancer_moves_is_told(tmp_path, moved):
+    path = write_shot(tmp_path, Recipe(nesting="/Crowd/Kinds/Hero"))
+    stage = Usd.Stage.Open(str(path))
+    crowd = UsdGeom.PointInstancer.Define(stage, "/Crowd")
+    crowd.CreatePrototypesRel().SetTargets(["/Crowd/Kinds/Hero"])
+    crowd.CreateProtoIndicesAttr([0, 0])
+    for code in (0, 8):
+        crowd.CreatePositionsAttr().Set([(0, 0, code if moved == "positions" else 0), (2, 0, 0)], code)
+        turned = Gf.Quath(0, 0, 1, 0) if code and moved == "orientations" else Gf.Quath(1)
+        crowd.CreateOrientationsAttr().Set([Gf.Quath(1), turned], code)
+        crowd.CreateVelocitiesAttr().Set([(0, 0, moved == "velocities"), (0, 0, 0)], code)
+    stage.Save()
+    notes = [note for note in read_shot(path).notes if note.startswith("/Crowd: moves its copies")]
+    assert len(notes) == bool(moved)
 
 
 def test_copies_by_a_point_instancer_are_told(shot):
