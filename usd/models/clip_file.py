@@ -8,6 +8,7 @@ import numpy as np
 from pxr import UsdSkel
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.animation.retarget import retarget
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
@@ -45,7 +46,7 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None, b
     """
     if Path(path).suffix.lower() == ".bvh":
         captured = read_bvh(path)
-        clip = retarget(captured, character)
+        clip = _retargeted(captured, character)
         if notes is not None:
             notes += motion_notes(captured, clip.joints, character.humanoid)
         return clip
@@ -83,7 +84,13 @@ def _on(character: Character, mover: StageRig, path: Path, notes: list[str] | No
             f"{path}: its bind pose is not the character's ('{furthest}' is {apart.max():.2g} m elsewhere), so the motion is "
             "retargeted, as a BVH's is"
         )
-    return retarget(Motion(path.stem, mover.character.skeleton, clip, 1.0), character)
+    return _retargeted(Motion(path.stem, mover.character.skeleton, clip, 1.0), character)
+
+
+def _retargeted(motion: Motion, character: Character) -> Clip:
+    """The motion on the character, with its cuts: where two takes were joined, or a T-pose leads in, nobody flew through the room."""
+    clip = retarget(motion, character)
+    return replace(clip, cuts=find_cuts(clip, character.head))
 
 
 def _apart(character: Character, mover: StageRig) -> np.ndarray:

@@ -15,6 +15,7 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.regression_options import RegressionOptions
+from neuralocks_core.training.rollouts import TrainingScene
 from usd.assets.grow import grow
 from usd.cli.train import one_by_one
 from usd.models.clip_file import read_clip
@@ -22,6 +23,7 @@ from usd.models.train import _command, begins_with, train
 from usd.models.training_scene import MOST_STRANDS, training_scene
 from usd.shot.stage import read_rigs
 
+from ...core.animation.written_bvh import write_bvh
 from ..shots import HAIR, PARENTS, Recipe, write_shot
 
 BODY = Path(__file__).parents[3] / "examples/shot/body.usdc"
@@ -212,6 +214,20 @@ def test_motion_that_tells_no_unit_and_axis_is_read_as_its_bind_pose_says(tmp_pa
     layer.Export(str(tmp_path / "untold.usda"))
     clip = read_clip(str(tmp_path / "untold.usda"), rig.character, beside=rig.border)
     np.testing.assert_allclose(clip.joints, rig.clip.joints, atol=1e-6)
+
+
+def test_no_training_flies_across_the_cuts_of_a_capture(tmp_path):
+    """A T-pose at the origin leads in, and two takes are joined: rollouts that held such a jump flung hair at 100 m/s."""
+    character = read_rigs(write_shot(tmp_path, Recipe(bound="mesh")))[0].character
+    places = [(0, 95, 0), *[(300 + 3 * i, 95, 0) for i in range(150)], *[(-80, 95, 200 + 3 * i) for i in range(150)]]
+    clip = read_clip(str(write_bvh(tmp_path / "take.bvh", [{}] * 301, places=places)), character)
+    np.testing.assert_allclose(clip.cuts, clip.times[[1, 151]])
+    parts = TrainingScene(character, (), (clip,)).usable(clip)
+    assert [len(part.times) for part in parts] == [150, 150]
+    fastest = max(
+        np.linalg.norm(np.diff(part.joints[:, character.head, :3, 3], axis=0), axis=1).max() for part in parts
+    )
+    assert fastest < 0.1
 
 
 @pytest.mark.parametrize("change", ["turned", "halved"])
