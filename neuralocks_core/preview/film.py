@@ -62,6 +62,7 @@ class Scene:
         body_rest: body points in bind pose (V, 3) [m], or None.
         mesh_hair: vertices of the body that are hair (V,) bool, or None.
         look: colours.
+        cuts: times of the first frame after each cut (C,) [s]: no camera flies from one place to the other.
         size: how many times a person's size the character is.
         collar: heights in bind pose [m] between which clothes begin, lower first, such as shoulders and neck, and how far aside
             shoulders are [m]; None if unknown.
@@ -79,6 +80,7 @@ class Scene:
     body_rest: np.ndarray | None = None
     mesh_hair: np.ndarray | None = None
     look: shading.Look = field(default_factory=shading.Look)
+    cuts: np.ndarray = ()
     size: float = 1.0
     collar: tuple[float, float, float] | None = None
 
@@ -139,7 +141,7 @@ class Film:
     def light(self, frame: int, azimuth: float) -> tuple:
         """Body, its colours, hair and its colours: everything about a frame but the drawing itself."""
         scene, shadow = self.scene, None
-        to_eye, lights = self._camera(frame, azimuth).to_eye, self._towards(azimuth - AZIMUTH)
+        to_eye, lights = self._camera(frame, azimuth).to_eye, self._towards(frame, azimuth - AZIMUTH)
         hair = tint = np.zeros((0, 3))
         if len(self._low):
             hair, tint, shadow = self._strands(frame, to_eye, lights)
@@ -219,25 +221,30 @@ class Film:
         return tone * ((1 - light) * np.array(scene.look.root) + light * np.array(scene.look.tip))
 
     def _follow(self, shape: float) -> None:
-        """Where cameras look, how far away they are, and where the face looks on average. Cameras go along with the head's
-        smoothed path but do not turn with it. `shape` is a picture's width by its height.
+        """Where cameras look, how far away they are, and where the face looks on average between cuts. Cameras go along with the
+        head's path, smoothed between cuts, but do not turn with it. `shape` is a picture's width by its height.
         """
         scene = self.scene
         centre = np.einsum("tij,j->ti", scene.head[:, :3, :3], scene.centre) + scene.head[:, :3, 3]
         step = np.median(np.diff(scene.times)) if len(scene.times) > 1 else 1.0
-        smooth = _blurred(centre, self._calm / step)
+        after = np.searchsorted(scene.times, np.asarray(scene.cuts) - 1e-9)
+        takes = [take for take in np.split(np.arange(len(centre)), after) if len(take)]
+        smooth = np.concatenate([_blurred(centre[take], self._calm / step) for take in takes])
         # How far the head strays from the smooth path, so that it stays in the picture during a jump.
         stray = np.abs(centre - smooth).max()
         reach, aside, above = self._extent()
         down = 0.36 * reach
         high = max(0.15 + 0.60 * reach, MARGIN * (above + down), MARGIN * aside / shape) + 0.6 * min(stray, 0.3)
-        front = scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1]
-        front /= np.linalg.norm(front)
-        # The average direction of the face, so that a shot in which the character turns does not show only its back.
-        turned = np.einsum("tij,j->ti", scene.head[:, :3, :3], front).mean(axis=0) * [1, 0, 1]
-        self._front = turned / np.linalg.norm(turned) if np.linalg.norm(turned) > 0.3 else front
+        self._front = np.concatenate([np.tile(self._faced(take), (len(take), 1)) for take in takes])
         self._aims = smooth - [0, down, 0]
         self._far = high / np.tan(np.radians(ANGLE) / 2)
+
+    def _faced(self, frames: np.ndarray) -> np.ndarray:
+        """The average direction of the face (3,), so that a shot in which the character turns does not show only its back."""
+        front = self.scene.facing.T @ np.array([0, 0, 1.0]) * [1, 0, 1]
+        front /= np.linalg.norm(front)
+        turned = np.einsum("tij,j->ti", self.scene.head[frames, :3, :3], front).mean(axis=0) * [1, 0, 1]
+        return turned / np.linalg.norm(turned) if np.linalg.norm(turned) > 0.3 else front
 
     def _extent(self) -> tuple[float, float, float]:
         """How far hair reaches from the middle of the head, how far to any side, and how far above it hair or head reach [m]."""
@@ -253,15 +260,15 @@ class Film:
 
     def _camera(self, frame: int, azimuth: float) -> Camera:
         up, aim = np.array([0, 1.0, 0]), self._aims[frame]
-        direction = self._towards(azimuth)[:, 2] + RAISED * up
+        direction = self._towards(frame, azimuth)[:, 2] + RAISED * up
         return Camera(aim + self._far * direction / np.linalg.norm(direction), aim, up)
 
-    def _towards(self, azimuth: float) -> np.ndarray:
+    def _towards(self, frame: int, azimuth: float) -> np.ndarray:
         """Axes (3, 3), columns right, up and towards somebody at that azimuth. Lights go round with the camera, so that no side
         is in the dark.
         """
-        aside, up = np.radians(azimuth), np.array([0, 1.0, 0])
-        towards = np.cos(aside) * self._front + np.sin(aside) * np.cross(up, self._front)
+        aside, up, front = np.radians(azimuth), np.array([0, 1.0, 0]), self._front[frame]
+        towards = np.cos(aside) * front + np.sin(aside) * np.cross(up, front)
         return np.stack([np.cross(up, towards), up, towards], axis=1)
 
 

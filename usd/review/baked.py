@@ -107,6 +107,7 @@ class Baked:
             triangles=None if body is None else body.triangles,
             body=None if body is None else pose,
             body_rest=None if body is None else body.points,
+            cuts=() if rig.clip.loop else rig.clip.cuts,
             size=character.times_human,
             collar=character.collar,
         )

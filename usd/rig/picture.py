@@ -43,6 +43,7 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
         body=lambda frame: character.posed_body(clip.joints[frame], clip.shape[frame]),
         body_rest=body.points,
         mesh_hair=hair,
+        cuts=() if clip.loop else clip.cuts,
         size=character.times_human,
         collar=character.collar,
     )

@@ -179,6 +179,21 @@ def test_a_large_head_or_hairdo_is_in_the_picture_from_all_sides(size, stretch):
             assert (np.abs(up) < highest).all() and (np.abs(right) < highest * size[0] / size[1]).all()
 
 
+def test_no_camera_flies_across_a_cut():
+    """For a third of a second on both sides of it, nobody was in the picture, and after it, only a back."""
+    person, half = scene(48), 24
+    head = np.tile(np.eye(4), (48, 1, 1))
+    head[half:, :3, :3] = np.diag([-1.0, 1, -1])
+    head[half:, :3, 3] = [4, 0, -3]
+    film = Film(replace(person, head=head, cuts=person.times[[half]]), 62, 62, SMALL, 0.3, plain_canvas.PlainCanvas)
+    with closing(film):
+        for frame in range(48):
+            camera = film._camera(frame, 0)
+            right, up, back = ((head[frame, :3, :3] @ CENTRE + head[frame, :3, 3] - camera.eye) @ camera.axes).T
+            assert max(abs(right), abs(up)) < -0.5 * back * np.tan(np.radians(camera_module.ANGLE) / 2), frame
+            assert (camera.axes[:, 2] @ head[frame, :3, 2]) > 0.9
+
+
 def test_the_picture_of_usual_hair_is_as_near_as_its_length_asks_for():
     with closing(Film(scene(), 62, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
         reach = np.linalg.norm(film.scene.rest - CENTRE, axis=1).max()
