@@ -19,10 +19,6 @@ from .services.remaining import in_words
 from .services.sliders import SLIDERS
 from .session import session
 
-RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press Bake and Attach again"
-MOVED = (
-    "in this frame the head is not where it was when the hair was baked; if the animation was changed, press {} again"
-)
 LATER = (
     "it knows no motion before it. To render a part of a shot again, turn off Scene Range in the panel Bake, and name the "
     "whole shot there"
@@ -235,8 +231,8 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         taking = row.row(align=True)
         taking.enabled = actions.has_keys(armature)
         taking.operator("neuralocks.remove_keys", text="", icon="X")
-        if actions.moved_since(armature, context.scene):
-            words(layout, f"{armature.name_full}: {MOVED.format('Bake to Keyframes')}", "ERROR")
+        if text := actions.changed_since(armature, context.scene):
+            words(layout, f"{armature.name_full}: {text}", "ERROR")
         column = layout.column(align=True)  # side by side, a sidebar of default width would cut them
         column.operator("neuralocks.export_skel", text="USD Animation", icon="EXPORT")
         column.operator("neuralocks.export_c", text="C Header", icon="FILE_SCRIPT")
@@ -266,12 +262,9 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
         hair = settings.hair
         taking.enabled = hair is not None and (attach.has_cache(hair) or bool(hair.neuralocks_hair.replaced))
         taking.operator("neuralocks.detach", text="", icon="X")
-        if hair is None or hair.neuralocks_hair.live:
-            return
-        if attach.retimed_since(hair, context.scene):
-            words(layout, f"{hair.name_full}: {RETIMED}", "ERROR")
-        elif attach.moved_since(hair, context.scene):
-            words(layout, f"{hair.name_full}: {MOVED.format('Bake and Attach')}", "ERROR")
+        if hair is not None and not hair.neuralocks_hair.live:
+            if text := attach.changed_since(hair, context.scene):
+                words(layout, f"{hair.name_full}: {text}", "ERROR")
 
 
 def findings(armature) -> tuple[list[str], str]:

@@ -137,6 +137,8 @@ class Session:
     failed: set[str] = field(default_factory=set)
     """Armatures that could not be sampled in the background; tried again when they, a rest pose or an action change."""
 
+    baked: dict[str, dict] = field(default_factory=dict)
+    """What the caches on disk were last baked of, by path, whichever file is open; see `scene.as_baked`."""
     files: int = 0
     """How many files were opened before the one that is open."""
     opened: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -193,7 +195,7 @@ class Session:
     def clear(self) -> None:
         """Forget everything, at file load and when the add-on is disabled; whoever is stepping frames must still end that."""
         self.stop_preparing_all()
-        self.__init__(paused=self.paused, working=self.working, files=self.files + 1)
+        self.__init__(paused=self.paused, working=self.working, baked=self.baked, files=self.files + 1)
 
     def tell(self, name: str, error: Exception) -> None:
         """Say in the panel what went wrong with an object; what its user cannot fix is on the console as well."""

@@ -100,11 +100,13 @@ class Baked(NamedTuple):
         hair: file and prim path by object name.
         notes: what an artist should know, in the words of the panel.
         prims: prim path by object name, of all that is in the shot.
+        frames: first and last.
     """
 
     hair: dict[str, tuple[str, str]]
     notes: list[str]
     prims: dict[str, str]
+    frames: tuple[int, int]
 
 
 def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool = False):
@@ -176,8 +178,8 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
             written |= prims
             notes += [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in result.notes]
     for out in outs:
-        attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()}, scene)
-    return Baked(baked, list(dict.fromkeys(notes)), written)
+        attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()}, scene, (first, last))
+    return Baked(baked, list(dict.fromkeys(notes)), written, (first, last))
 
 
 def _outs(path: Path, count: int) -> list[Path]:
@@ -199,7 +201,7 @@ class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):
         path = self.filepath or context.scene.neuralocks.output
         hairs = hairs_of(armature, context.scene)
         undrawn = [hair.name_full for hair in hairs if not in_renders(hair, context.scene)]
-        baked, notes, _ = yield from bake_steps(context, armature, hairs, path, undrawn)
+        baked, notes, *_ = yield from bake_steps(context, armature, hairs, path, undrawn)
         left = dict.fromkeys(f"'{modifier}'" for name in baked for modifier in on_top(named(name)))
         more = f"; not in the file: modifiers {', '.join(left)} (Bake and Attach plays below them)" if left else ""
         tell(self, f"Baked to {', '.join(sorted({out for out, _ in baked.values()}))}{more}", notes)
@@ -226,11 +228,11 @@ class NEURALOCKS_OT_bake_attach(Stepwise, bpy.types.Operator):
             return any(other != name for other in players) or owner_of(out, character) != ""
 
         path = untaken(path, label, taken)
-        baked, notes, _ = yield from bake_steps(context, named(character), [named(name)], str(path), attached=True)
+        baked = yield from bake_steps(context, named(character), [named(name)], str(path), attached=True)
         hair = named(name)
         hair.neuralocks_hair.live = False
-        attach.attach(hair, *baked[name], context.scene)
-        tell(self, f"{name}: now plays {baked[name][0]}", notes)
+        attach.attach(hair, *baked.hair[name], context.scene, baked.frames)
+        tell(self, f"{name}: now plays {baked.hair[name][0]}", baked.notes)
 
 
 class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):

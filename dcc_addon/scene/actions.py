@@ -60,7 +60,6 @@ def bake_keys(armature, bones, hair: tuple[np.ndarray, np.ndarray], own: tuple[n
     _strip(data, BEFORE + ending, below)
     action = _action(armature, f"{armature.name} Hair", modes, *hair)
     action[KEPT], action[ALONE] = before, alone.keep_alone(data, HAIR)
-    as_baked.remember(action, armature)
     # If tracks are deleted by hand, the first bake knows the artist's own rotations.
     settings.keys_kept = rotations.joined(before, older[0])
     settings.keys_alone = older[1] or action[ALONE]
@@ -140,9 +139,10 @@ def has_keys(armature) -> bool:
     return bool(armature.neuralocks_character.keys_kept) and not playing
 
 
-def moved_since(armature, scene) -> bool:
-    """Whether the head is elsewhere in the shown frame than when hair keys that play were baked."""
-    return any(as_baked.moved_since(action, armature, scene) for action in _actions(armature, playing=True))
+def changed_since(armature, scene) -> str:
+    """What was changed since hair keys that play were baked, and shows in this frame, with the remedy; empty if nothing is known to be."""
+    told = (action[as_baked.KEY] for action in _actions(armature, playing=True) if as_baked.KEY in action)
+    return as_baked.changed(next(told, None), armature, scene, "Bake to Keyframes")
 
 
 def beside_others(armature) -> bool:

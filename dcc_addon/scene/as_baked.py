@@ -1,49 +1,79 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the head stood in each frame when hair was baked, stored with the bake, so that the panel sees when the animation was changed
-afterwards: also after the file was opened again, and without sampling the motion again.
+"""What hair was baked of, stored with the bake, so that the panel sees when the shot was changed afterwards: also after the file was
+opened again, and without sampling the motion again.
 """
 
+import bpy
 import numpy as np
 
-from ..session import SampledRig, session
+from ..session import session
 from .armature import matrix
+from .layers import layer_of
 from .shown import shown_frame
 
-KEY = "neuralocks_heads"
+KEY = "neuralocks_baked"
 """The property of a cache file, or of an action with hair keys, that stores it."""
 MOST = 2000
-"""Most frames that are stored."""
+"""Most frames of which is stored how the head stood."""
 NEAR = 1e-3
-"""Transforms of the head that differ by less (in matrix entries) are the same pose."""
+"""Turns [rad] and ways, in Blender's units, that are not told from none."""
+RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press {} again"
+BEYOND = "frames {first} to {last} were baked, and this one was not; to let it move here, press {} again"
+MOVED = (
+    "in this frame the head is not where it was when the hair was baked; if the animation was changed, press {} again"
+)
 
 
-def remember(block, armature) -> None:
-    """Store with a bake how the head of this armature stands in the whole frames of the motion that was sampled for it."""
-    sampled = session.rigs.get(armature.name_full) if armature is not None else None
-    if sampled is None:
-        block.pop(KEY, None)
-        return
-    frames, head = sampled.motion.frames, sampled.character.head
-    whole = np.flatnonzero(frames % 1 == 0)[:MOST]
-    block[KEY] = {
+def remember(block, armature, scene, frames: tuple[int, int]) -> dict:
+    """Store with a bake of these frames, first and last, the scene's timing and how the head of this armature stands in them, in the
+    motion that was sampled for it; returns what is stored.
+    """
+    sampled = session.rigs[armature.name_full]
+    head, numbers = sampled.character.head, sampled.motion.frames
+    rows = np.flatnonzero((numbers % 1 == 0) & (numbers >= frames[0]) & (numbers <= frames[1]))[:MOST]
+    stood = sampled.drawn[rows, head].astype(float) @ np.linalg.inv(sampled.trim[head])
+    told = {
         "bone": sampled.rig.bones[head],
-        "first": int(frames[whole[0]]),
-        "heads": _stood(sampled, head)[whole].ravel().tolist(),
+        "first": int(frames[0]),
+        "last": int(frames[1]),
+        "timing": _timing(scene),
+        "heads": stood[:, :3].ravel().tolist(),
     }
+    block[KEY] = told
+    return told
 
 
-def moved_since(block, armature, scene) -> bool:
-    """Whether the head of this armature is drawn elsewhere in the shown frame than when the hair was baked; not if that is unknown."""
-    told, frame = block.get(KEY), shown_frame(scene)
-    bone = armature.pose.bones.get(told["bone"]) if told and armature.visible_get() else None
-    row = round(frame) - told["first"] if bone is not None else -1
-    stood = np.array(told["heads"]).reshape(-1, 3, 4) if told else ()
-    if not 0 <= row < len(stood) or abs(frame - round(frame)) > NEAR:
+def changed(told, armature, scene, remedy: str) -> str:
+    """What was changed since a bake, of which `told` was stored, and shows in this frame, with the remedy; empty if nothing is known
+    to be.
+    """
+    if not told or armature is None:
+        return ""
+    first, last, frame = told["first"], told["last"], shown_frame(scene)
+    if not np.allclose(list(told["timing"]), _timing(scene), rtol=1e-6, atol=0):
+        return RETIMED.format(remedy)
+    if not first <= frame <= last:
+        rendered = scene.frame_start <= frame <= scene.frame_end
+        return BEYOND.format(remedy, first=first, last=last) if rendered else ""
+    return MOVED.format(remedy) if _moved(told, armature, scene, frame) else ""
+
+
+def _moved(told, armature, scene, frame: float) -> bool:
+    """Whether the head is drawn elsewhere than when the hair was baked; not if that is unknown: between frames, and where Blender does
+    not pose the armature.
+    """
+    bone, stood = armature.pose.bones.get(told["bone"]), np.array(told["heads"]).reshape(-1, 3, 4)
+    row = round(frame) - told["first"]
+    if bone is None or row >= len(stood) or abs(frame - round(frame)) > NEAR:
         return False
-    here = matrix(armature.matrix_world @ bone.matrix)[:3]
-    return bool((np.abs(here - stood[row]) > NEAR * (1 + np.abs(stood[row]))).any())
+    if layer_of(armature, scene) != bpy.context.view_layer:
+        return False
+    off, size = matrix(armature.matrix_world @ bone.matrix)[:3] - stood[row], np.abs(stood[row, :, :3]).max()
+    return bool(
+        np.abs(off[:, :3]).max() > NEAR * size or (np.abs(off[:, 3]) > NEAR * (1 + np.abs(stood[row, :, 3]))).any()
+    )
 
 
-def _stood(sampled: SampledRig, joint: int) -> np.ndarray:
-    """World transforms (T, 3, 4) of a joint as Blender gave them."""
-    return (sampled.drawn[:, joint].astype(float) @ np.linalg.inv(sampled.trim[joint]))[:, :3]
+def _timing(scene) -> list[float]:
+    render = scene.render
+    return [render.fps / render.fps_base, render.frame_map_new / render.frame_map_old]

@@ -8,6 +8,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..session import session
 from . import as_baked, blur, cached_strands
 from .muting import CACHE as MODIFIER
 from .muting import mute_deformers, off_meanwhile, unmute_deformers
@@ -17,8 +18,6 @@ from .save_as import named_here
 
 REPLACED = "replaced"
 """The setting that stores which modifiers are off because the cache contains the surface's motion."""
-RATE = "neuralocks_rate"
-"""The property of a cache file that stores the frames per second of the scene that it was baked for."""
 
 
 def check_own(thing) -> None:
@@ -52,24 +51,15 @@ def has_cache(thing) -> bool:
     return shown or _original(thing, modifier) is None
 
 
-def retimed_since(thing, scene) -> bool:
-    """Whether this scene's frame rate or time stretching has changed since the cache of an object was baked. The cache then stays in
-    step with the body, but plays the motion that it was baked for, and ends with its frames.
+def changed_since(thing, scene) -> str:
+    """What was changed since the cache of an object was baked, and shows in this frame, with the remedy; empty if nothing is known to be.
+    If Blender took a bake back, by an undo or by opening the file again, its file on disk is still that of the last one.
     """
     cache = thing.modifiers[MODIFIER].cache_file if has_cache(thing) else None
     if cache is None:
-        return False
-    drivers = cache.animation_data.drivers if cache.animation_data else ()
-    stretch = "".join(curve.driver.expression for curve in drivers if curve.data_path == "frame")
-    rate = cache.get(RATE, _rate(scene))  # older files do not tell it
-    return stretch != _in_step(scene) or rate != _rate(scene)
-
-
-def moved_since(thing, scene) -> bool:
-    """Whether the head is elsewhere in the shown frame than when the cache of an object was baked."""
-    cache = thing.modifiers[MODIFIER].cache_file if has_cache(thing) else None
-    armature = thing.neuralocks_hair.armature
-    return cache is not None and armature is not None and as_baked.moved_since(cache, armature, scene)
+        return ""
+    told = session.baked.get(_place(cache), cache.get(as_baked.KEY))
+    return as_baked.changed(told, thing.neuralocks_hair.armature, scene, "Bake and Attach")
 
 
 def players(path: str) -> list:
@@ -91,8 +81,10 @@ def is_imported(path: str) -> bool:
     return False
 
 
-def renew(path: str, prims: dict[str, str], scene) -> None:
-    """Show what has just been written to the USD file `path` on the hair that plays it: its prim of `prims`, by its name."""
+def renew(path: str, prims: dict[str, str], scene, frames: tuple[int, int]) -> None:
+    """Show what has just been written of these frames, first and last, to the USD file `path` on the hair that plays it: its prim of
+    `prims`, by its name.
+    """
     playing = players(path)
     # A cache that is off still holds the strands of before, until it is removed.
     other = [hair for hair in playing if cached_strands.is_off(hair.data)]
@@ -103,7 +95,7 @@ def renew(path: str, prims: dict[str, str], scene) -> None:
         if modifier.object_path != prim:
             modifier.object_path = prim
         blur.attach(hair)
-        as_baked.remember(modifier.cache_file, hair.neuralocks_hair.armature)
+        _remember(hair, modifier.cache_file, scene, frames)
     caches = {hair.modifiers[MODIFIER].cache_file for hair in playing}
     for cache in caches:
         _follow_time(cache, scene)
@@ -111,18 +103,18 @@ def renew(path: str, prims: dict[str, str], scene) -> None:
         read_again(caches)
     for hair in other:
         if hair.name_full in prims:
-            attach(hair, path, prims[hair.name_full], scene)
+            attach(hair, path, prims[hair.name_full], scene, frames)
 
 
-def attach(hair, path: str, prim: str, scene) -> None:
-    """Let the hair play the groom `prim` of the USD file `path`, whose time codes are frames of this scene."""
+def attach(hair, path: str, prim: str, scene, frames: tuple[int, int]) -> None:
+    """Let the hair play the groom `prim` of the USD file `path`, whose time codes are frames of this scene, from first to last."""
     detach(hair)
     mute_deformers(hair, REPLACED)
     cache = _cache_file(path)
     read_again([cache])
     cache.scale = 1.0
     _follow_time(cache, scene)
-    as_baked.remember(cache, hair.neuralocks_hair.armature)
+    _remember(hair, cache, scene, frames)
     modifier = hair.modifiers.get(MODIFIER) or hair.modifiers.new(MODIFIER, "MESH_SEQUENCE_CACHE")
     modifier.show_viewport = modifier.show_render = True
     modifier.cache_file = cache
@@ -177,16 +169,11 @@ def _follow_time(cache, scene) -> None:
     """Play the baked frames even if time is stretched: everything animated, including caches, is then at another frame than the one
     shown.
     """
-    cache[RATE] = _rate(scene)
     cache.driver_remove("frame")
     expression = _in_step(scene)
     cache.override_frame = bool(expression)
     if expression:
         cache.driver_add("frame").driver.expression = expression
-
-
-def _rate(scene) -> float:
-    return round(scene.render.fps / scene.render.fps_base, 6)
 
 
 def _in_step(scene) -> str:
@@ -208,6 +195,14 @@ def _cache_file(path: str):
     return cache
 
 
+def _remember(hair, cache, scene, frames: tuple[int, int]) -> None:
+    if hair.neuralocks_hair.armature is not None:
+        session.baked[_place(cache)] = as_baked.remember(cache, hair.neuralocks_hair.armature, scene, frames)
+
+
 def _is(cache, path: str) -> bool:
-    named = full(cache.filepath, cache.library)
-    return os.path.normcase(os.path.abspath(named)) == os.path.normcase(os.path.abspath(path))
+    return _place(cache) == os.path.normcase(os.path.abspath(path))
+
+
+def _place(cache) -> str:
+    return os.path.normcase(os.path.abspath(full(cache.filepath, cache.library)))

@@ -7,6 +7,7 @@ from unittest import SkipTest
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, baked_points, give_bone_model, make_live, messages, needs_usd, points_at
@@ -164,6 +165,7 @@ def retimed_since(folder: Path) -> None:
     rig, strands = scenes.dancer(20)
     scene = bpy.context.scene
     make_live(rig, strands)
+    scene.frame_set(1)  # where the rig was not posed yet
     scene.neuralocks.output = str(folder / "hair.usdc")
 
     def told() -> bool:
@@ -201,9 +203,9 @@ def retimed_since(folder: Path) -> None:
     assert bpy.ops.neuralocks.detach() == {"FINISHED"} and not told()
 
 
-def moved_since(folder: Path) -> None:
+def changed_since(folder: Path) -> None:
     """If the animation changes after hair was attached, or its bones were keyed, a note says so in each frame in which the head is
-    elsewhere, also when the file is opened again, until the hair is baked anew.
+    elsewhere, also when the file is opened again, until the hair is baked anew; another one says which frames were not baked.
     """
     needs_usd()
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
@@ -212,45 +214,83 @@ def moved_since(folder: Path) -> None:
     strands = scenes.hair(rig, 20)
     strands.neuralocks_hair.armature = rig
     give_bone_model(rig, folder)
-    operators, scene = bpy.ops.neuralocks, bpy.context.scene
+    operators, scene, name = bpy.ops.neuralocks, bpy.context.scene, rig.name
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     scene.neuralocks.output = str(folder / "hair.usdc")
+    scene.frame_start, scene.frame_end = 1, 24
+    neither, both = [False, False], [True, True]
 
-    def told(*frames) -> list:
+    def told(*frames, wanted="the head is not where it was") -> list:
         found = []
         for frame in frames:
             bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
             said = " ".join(drawn())
-            assert said.count("the head is not where it was") == said.count("if the animation was changed, press"), said
             found.append([f"press {name} again" in said for name in ("Bake and Attach", "Bake to Keyframes")])
+            assert said.count(wanted) == sum(found[-1]), said
         return found
 
-    def key(turned: float):
-        head = bpy.data.objects[rig_name].pose.bones["head"]
-        head.rotation_euler[1] += turned
-        head.keyframe_insert("rotation_euler", frame=bpy.context.scene.frame_current)
+    def turn_head(frame: int = 10):
+        bpy.context.scene.frame_set(frame)
+        head = bpy.data.objects[name].pose.bones["head"]
+        head.rotation_euler[1] += 0.05
+        head.keyframe_insert("rotation_euler", frame=frame)
 
-    rig_name, neither, both = rig.name, [False, False], [True, True]
     assert operators.bake_attach() == operators.bake_keys() == {"FINISHED"}
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     for _ in range(2):
         assert told(1, 10, 10.5, 24, 30) == [neither] * 5
         bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
-    bpy.context.scene.frame_set(10)
-    key(0.1)
-    assert told(1, 10, 10.5, 24, 30) == [neither, both, neither, neither, neither]
+    turn_head()
+    assert told(1, 10, 10.5, 24) == [neither, both, neither, neither]
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     assert told(10, 24) == [both, neither]
-    bpy.data.objects[rig_name].hide_set(True)  # Blender does not pose it, so nothing is known
-    assert told(10) == [neither]
-    bpy.data.objects[rig_name].hide_set(False)
+    rig = bpy.data.objects[name]
+    rig.hide_set(True)  # Blender poses it on for its body
+    assert told(10, 24) == [both, neither]
+    for hidden in (True, False):
+        for thing in bpy.data.objects:
+            thing.hide_viewport = hidden
+        assert told(10) == [neither if hidden else both], "nothing poses it if all is hidden"
     assert operators.bake_attach() == {"FINISHED"} and told(10) == [[False, True]]
+    bpy.ops.wm.save_mainfile()
     assert operators.bake_keys() == {"FINISHED"} and told(10) == [neither]
-    bpy.context.scene.frame_set(10)
-    key(0.1)
-    assert told(10) == [both]
-    assert operators.detach() == operators.remove_keys() == {"FINISHED"} and told(10) == [neither]
+    turn_head()
+    assert told(10) == [both] and operators.bake_attach() == {"FINISHED"}
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))  # Revert
+    assert told(10) == [both], "the file on disk is the bake that was taken back"
+    assert operators.bake_attach() == operators.bake_keys() == {"FINISHED"} and told(10) == [neither]
+    scene = bpy.context.scene
+    scene.frame_end = 40
+    assert told(24, 30, 40, 41, wanted="frames 1 to 24 were baked") == [neither, both, both, neither]
+    scene.render.fps = 2 * scene.render.fps
+    assert told(10, wanted="the frame rate or Time Stretching was changed") == [both]
+    scene.render.fps = scene.render.fps // 2
+    turn_head(30)
+    scene.neuralocks.use_scene_range, scene.neuralocks.frame_start, scene.neuralocks.frame_end = False, 8, 12
+    assert operators.bake_attach() == operators.bake_keys() == {"FINISHED"}
+    assert told(7, 9, 30, wanted="frames 8 to 12 were baked") == [both, neither, both]
+    assert operators.detach() == operators.remove_keys() == {"FINISHED"} and told(9, 30) == [neither] * 2
+
+
+def changed_since_in_centimetres(folder: Path) -> None:
+    """An armature of a hundredth of its bones' size turns as far as any other."""
+    needs_usd()
+    rig, strands = scenes.dancer(20)
+    rig.data.transform(Matrix.Scale(100, 4))
+    rig.scale = [0.01] * 3
+    make_live(rig, strands)
+    scene = bpy.context.scene
+    scene.neuralocks.output = str(folder / "hair.usdc")
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}
+    said = []
+    for turned in (0, 0.02):
+        scene.frame_set(10)
+        rig.pose.bones["head"].rotation_euler[1] += turned
+        rig.pose.bones["head"].keyframe_insert("rotation_euler", frame=10)
+        scene.frame_set(10)
+        said.append("the head is not where it was" in " ".join(drawn()))
+    assert said == [False, True]
 
 
 def drawn_alike(folder: Path) -> None:
