@@ -20,6 +20,7 @@ from .scene.lively import lively
 from .scene.locked import lock
 from .scene.overrides import make_comparable
 from .scene.save_as import Remade
+from .scene.shapes import follows
 from .scene.together import drawn_with
 from .scene.up_to_date import ensure
 from .scene.windows import layer_shown
@@ -70,7 +71,8 @@ def on_update(scene, graph):
     if not names:
         return
     meshes = {u.id.name_full for u in graph.updates if isinstance(u.id, bpy.types.Mesh) and u.is_updated_geometry}
-    edited = meshes and any(b.data.name_full in meshes for a in live.carriers(scene) for b in bodies_of(a, scene))
+    bodies = [body.data for a in live.carriers(scene) for body in bodies_of(a, scene)] if meshes else ()
+    edited = any(mesh.name_full in meshes and not follows(mesh, originals) for mesh in bodies)
     if edited or any(isinstance(thing, bpy.types.Action) and thing.name_full not in switched for thing in changed):
         _mark_stale()
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):

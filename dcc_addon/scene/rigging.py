@@ -3,6 +3,7 @@
 Blender only reports that the object has changed, as it does when a bone is posed; for keys it names the action.
 """
 
+import re
 import zlib
 
 import bpy
@@ -20,6 +21,8 @@ LIMITED = tuple(f"{what}_{axis}" for what in ("use_ik_limit", "lock_ik") for axi
 """Settings of bones that posing does not change."""
 DELTA = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
 """What adds to an object's own channels, PLACE."""
+_ONE = re.compile(r"(\[\d+\]|\.[wxyz])$")
+"""How the path of one number of several ends; curves name all of them, and the number beside."""
 
 
 def rigging(things) -> int:
@@ -92,7 +95,7 @@ def _object(thing) -> list:
 def _held(thing) -> list:
     moving, live = animated(thing.animation_data, HAIR), as_before(thing)
     found = [getattr(thing, name)[:] for name in (*PLACE, *DELTA) if name not in moving]
-    found += [_mode(thing, "", moving), _lists(thing), *(_read(data) for data in _animation(thing))]
+    found += [_mode(thing, "", moving), _lists(thing, "", moving), *(_read(data) for data in _animation(thing))]
     if thing.pose is not None:
         bones = thing.pose.bones
         found.append(thing.data.pose_position)
@@ -107,7 +110,7 @@ def _held(thing) -> list:
                     values[row] = live[bone.name].get(name, values[row])
             found.append(zlib.crc32(values))
         for bone, start in zip(bones, starts, strict=True):
-            found += [_mode(bone, start, moving, live.get(bone.name, {})), _lists(bone)]
+            found += [_mode(bone, start, moving, live.get(bone.name, {})), _lists(bone, start[:-1], moving)]
     return found
 
 
@@ -118,9 +121,13 @@ def _mode(owner, start: str, moving: set[str], live=()) -> str:
     return live["rotation_mode"] if "rotation_mode" in live else owner.rotation_mode
 
 
-def _lists(owner) -> list:
-    """Lists of numbers among the custom properties; `rigging` covers single ones."""
-    return [(key, value.to_list()) for key, value in owner.items() if hasattr(value, "to_list")]
+def _lists(owner, start: str, moving: set[str]) -> list:
+    """Lists of numbers among the custom properties that no animation writes; `rigging` covers single ones."""
+    return [
+        (key, value.to_list())
+        for key, value in owner.items()
+        if hasattr(value, "to_list") and _custom(start, key) not in moving
+    ]
 
 
 def _read(data) -> list:
@@ -136,7 +143,7 @@ def _read(data) -> list:
             continue
         if owner not in written:
             written[owner] = animated(getattr(owner, "animation_data", None))
-        if path not in written[owner]:
+        if not {path, _ONE.sub("", path)} & written[owner]:
             found.append(value_of(owner, path))
     return found
 
@@ -155,8 +162,13 @@ def _numbers(owner, start: str, moving: set[str]) -> list:
     return [
         (key, value)
         for key, value in owner.items()
-        if isinstance(value, (int, float)) and f'{start}["{bpy.utils.escape_identifier(key)}"]' not in moving
+        if isinstance(value, (int, float)) and _custom(start, key) not in moving
     ]
+
+
+def _custom(start: str, key: str) -> str:
+    """The path of a custom property."""
+    return f'{start}["{bpy.utils.escape_identifier(key)}"]'
 
 
 def _constraint(constraint, start: str, moving: set[str]) -> list:

@@ -32,6 +32,13 @@ def shape(thing) -> list:
     return []
 
 
+def follows(mesh, others) -> bool:
+    """Whether drivers of a mesh's shape keys read one of these objects: its shape then changes with their pose, which is no edit."""
+    data = mesh.shape_keys.animation_data if mesh.shape_keys else None
+    variables = [variable for curve in data.drivers for variable in curve.driver.variables] if data else []
+    return any(target.id in others for variable in variables for target in variable.targets)
+
+
 def _curve(curve) -> list:
     moving = animated(curve.animation_data)
     found = as_set(curve, [name for name in CURVE if name not in moving])

@@ -219,6 +219,44 @@ def held_otherwise(_folder: Path) -> None:
     assert session.rigs["Rig"].stale
 
 
+def read_by_number(_folder: Path) -> None:
+    """Drivers that read one number of a keyed channel, keyed lists, and shape keys that correct a pose do not make the motion out of
+    date in each other frame or pose; edits of such shapes do.
+    """
+    from dcc_addon.scene.up_to_date import notice
+    from dcc_addon.session import session
+
+    rig, scene = scenes.armature(), bpy.context.scene
+    skin = scenes.body(rig)
+    scenes.dance(rig)
+    skin.shape_key_add(name="Basis")
+    correction = skin.shape_key_add(name="Bent")
+    for point in correction.data:
+        point.co = 1.01 * point.co
+    for bone, path in (("neck", 'pose.bones["upper_arm.L"].rotation_euler[2]'), ("chest", "location.x")):
+        driver = rig.pose.bones[bone].driver_add("rotation_euler", 0).driver
+        driver.expression, variable = "0.3 * v", driver.variables.new()
+        variable.name, variable.targets[0].id, variable.targets[0].data_path = "v", rig, path
+    driver = correction.driver_add("value").driver
+    driver.expression, variable = "abs(v)", driver.variables.new()
+    variable.name, variable.type, target = "v", "TRANSFORMS", variable.targets[0]
+    target.id, target.bone_target, target.transform_type = rig, "upper_arm.L", "ROT_Z"
+    for frame in (1, 12):
+        rig.pose.bones["spine"]["swings"] = [0.1 * frame, 1.0]
+        rig.keyframe_insert('pose.bones["spine"]["swings"]', frame=frame)
+    make_live(rig, scenes.hair(rig, 20))
+    for frame in (1, 5, 10):
+        scene.frame_set(frame)
+        rig.pose.bones["head"].rotation_euler[0] += 0.1
+        bpy.context.view_layer.update()
+        notice(rig, scene)
+        assert not session.rigs["Rig"].stale, frame
+    skin.data.vertices[0].co.x += 0.01
+    skin.data.update()
+    bpy.context.view_layer.update()
+    assert session.rigs["Rig"].stale
+
+
 def hidden_prop(folder: Path) -> None:
     """A prop hidden by a scale of zero does not prevent a bake; a hidden bone that moves hair gets a message."""
     prop = [*scenes.BONES, ("prop", "forearm.L", (0.5, 0, 1.2), (0.6, 0, 1.2))]
