@@ -95,6 +95,30 @@ def edited(folder: Path, edit, recipe: Recipe = Recipe()) -> Path:
     return path
 
 
+def place_skeleton(stage: Usd.Stage, place: np.ndarray) -> None:
+    """Put the skeleton's prim elsewhere, (4, 4) of one scale, and its joints back to where they were: bind transforms, which stay, are
+    then in the world's space and not in the skeleton's.
+    """
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath(RIG))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath(MOTION))
+    skeleton.AddTransformOp().Set(Gf.Matrix4d(place.T.tolist()))
+    back = np.linalg.inv(place).T
+    rest = np.array(skeleton.GetRestTransformsAttr().Get())
+    skeleton.GetRestTransformsAttr().Set(Vt.Matrix4dArray.FromNumpy(np.concatenate([rest[:1] @ back, rest[1:]])))
+    channels = motion.GetTranslationsAttr(), motion.GetRotationsAttr(), motion.GetScalesAttr()
+    poses = {}
+    for code in motion.GetTranslationsAttr().GetTimeSamples():
+        poses[code] = np.array(UsdSkel.MakeTransforms(*(channel.Get(code) for channel in channels)))
+        poses[code][:1] = poses[code][:1] @ back
+    for channel in channels:
+        channel.Clear()
+    for code, pose in poses.items():
+        for channel, values in zip(
+            channels, UsdSkel.DecomposeTransforms(Vt.Matrix4dArray.FromNumpy(pose)), strict=True
+        ):
+            channel.Set(values, code)
+
+
 def write_loop(folder: Path) -> Path:
     """Write a shot of six strands on a head that shakes once in 12 frames, with the 13th frame like the first."""
     path = write_shot(folder, Recipe(frames=13, strands=6), "loop")

@@ -76,6 +76,15 @@ def read_beside(prim: Usd.Prim, groom: Groom, notes: list[str]) -> Beside:
     others = [each.GetName() for each in prim.GetAuthoredAttributes() if each.IsCustom()]
     if others := [name for name in others if not name.startswith(ELSEWHERE)]:
         notes.append(f"{prim.GetPath()}: {', '.join(others)} left out; only primvars are imported, make them primvars")
+    if UsdGeom.BasisCurves(prim).GetNormalsAttr().HasAuthoredValue():
+        notes.append(
+            f"{prim.GetPath()}: its normals, which make ribbons, are not imported; author them on the new groom"
+        )
+    if subsets := UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim)):
+        notes.append(
+            f"{prim.GetPath()}: its {len(subsets)} subsets, such as {subsets[0].GetPrim().GetName()}, are not imported, nor their "
+            "materials; bind these to the new groom"
+        )
     material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
     if material:
         notes.append(f"{prim.GetPath()}: its material {material.GetPath()} is not imported; bind one to the new groom")

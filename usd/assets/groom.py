@@ -11,7 +11,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.strand_set import root_uv
 
-from ..baking.header import write_header
+from ..baking.header import RANGE, write_header
 from ..border.arrays import floats, integers, row_matrix
 from ..border.stage_files import write_stage
 from ..shot.curve_ends import Beyond
@@ -73,8 +73,8 @@ class Over:
         """Make a layer, to be found at `out`, one over the file."""
         codes = self.rig.time_codes[[0, -1]].tolist()
         write_header(layer, self.stage, self.rig.border, self.path, out, codes)
-        if not self.stage.HasAuthoredTimeCodeRange():  # a range here would hide what animates the character later
-            for name in ("startTimeCode", "endTimeCode"):
+        for name in RANGE:
+            if not self.stage.HasAuthoredMetadata(name):  # a range here would hide what animates the character later
                 layer.pseudoRoot.ClearInfo(name)
 
 
@@ -98,7 +98,7 @@ def write_grooms(path, grooms: list[Authored], rig: StageRig | None = None, over
     """
 
     border = rig.border if rig else None
-    place = np.eye(4) if rig is None else rig.source.placement.reference @ np.linalg.inv(rig.to_bind)
+    place = np.eye(4) if rig is None else rig.source.bind_shown @ np.linalg.inv(rig.to_bind)
 
     def author(stage: Usd.Stage) -> None:
         UsdGeom.SetStageUpAxis(stage, border.up_axis if border else UsdGeom.Tokens.y)

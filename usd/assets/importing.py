@@ -26,11 +26,13 @@ from ..border.units import Border
 from ..shot.curve_ends import beyond_ends
 from ..shot.curves import find_curves, read_groom, widths_attribute, without_points
 from ..shot.groom_notes import no_points
-from ..shot.notes import few, first_of, unlikely_head
+from ..shot.notes import composition_notes, few, first_of, unit_notes, unlikely_head
+from ..shot.other_curves import of_other_kinds
 from ..shot.rig_controls import open_curves
 from ..shot.seat_notes import REVERSED
 from ..shot.stage import read_rigs, read_shot
 from ..skel.binding import bound_skeleton, geom_bind
+from ..skel.joints import JointSource
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .beside import Beside, Primvar, read_beside
@@ -93,7 +95,7 @@ def import_groom(
     notes += told
     for number, path in enumerate(sources):
         say((_READ if rig else _LAID) * number // len(sources), 1000, f"reading {path.name}")
-        read, told = _read(path, out, counted, up)
+        read, told = _read(path, out, counted, up, rig is not None)
         found += read
         notes += told
     if rig:
@@ -117,10 +119,10 @@ def _common_unit(sources: list[Path], sized: bool) -> tuple[float | None, list[s
     return formats.common_unit(sources, sized)
 
 
-def _read(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
-    """The grooms of a file, and what a user should know."""
+def _read(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Authored], list[str]]:
+    """The grooms of a file, and what a user should know; `sized` if a head sizes them."""
     if source.suffix.lower() in (*USD, *OTHERS):
-        return _read_usd(source, out, unit, up)
+        return _read_usd(source, out, unit, up, sized)
     from neuralocks_core import formats
 
     groom, look, notes = formats.read_with_look(source, unit, up)
@@ -183,17 +185,23 @@ def _place(prim: Usd.Prim) -> np.ndarray:
     skeleton = bound_skeleton(prim)
     if skeleton is None:
         return Placement(prim).reference
-    return Placement(prim.GetStage().GetPrimAtPath(skeleton)).reference @ geom_bind(prim)
+    skeleton = prim.GetStage().GetPrimAtPath(skeleton)
+    try:
+        shown = JointSource(skeleton).bind_shown
+    except NeuralocksError:  # whatever is wrong with it, its curves are imported
+        shown = Placement(skeleton).reference
+    return shown @ geom_bind(prim)
 
 
 @names_damage
-def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[str]]:
+def _read_usd(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Authored], list[str]]:
     stage = open_stage(source)
     check_not_input(out, stage)
     border = Border.of(stage)
     metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
     border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
-    found, notes, left = [], [], []
+    found, notes, left = [], composition_notes(stage, source), []
+    notes += unit_notes(stage, source) if unit is None and not sized else []
     every = find_curves(stage)
     hair = open_curves(every)
     closed, empty = [prim for prim in every if prim not in hair], without_points(hair)
@@ -203,7 +211,7 @@ def _read_usd(source: Path, out: Path, unit, up) -> tuple[list[Authored], list[s
             for prim in closed
         ]
     )
-    notes += few([no_points(str(prim.GetPath())) for prim in empty])
+    notes += few([no_points(str(prim.GetPath())) for prim in empty]) + of_other_kinds(stage)
     for prim in (prim for prim in hair if prim not in empty):
         curves = UsdGeom.BasisCurves(prim)
         groom = read_groom(prim, border.to_core @ _place(prim), notes)

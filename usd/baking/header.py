@@ -13,19 +13,20 @@ from ..border.units import Border
 
 LAYERS_OWN = {"subLayers", "subLayerOffsets", "layerRelocates", "comment", "documentation", "owner", "sessionOwner"}
 """Metadata of a single layer, or that USD also reads from sublayers."""
+RANGE = "startTimeCode", "endTimeCode"
 
 
 def write_header(layer: Sdf.Layer, stage: Usd.Stage, border: Border, shot: Path, out: Path, codes: list[float]) -> None:
     """Sublayer the shot by a path relative to `out`, and repeat what USD reads from a stage's first layer only."""
-    ranged = stage.HasAuthoredTimeCodeRange()
+    said = {name: stage.GetMetadata(name) for name in RANGE if stage.HasAuthoredMetadata(name)}  # perhaps one of both
     facts = {
         "metersPerUnit": border.metres_per_unit,
         "upAxis": border.up_axis,
         "timeCodesPerSecond": border.rate,
         "framesPerSecond": stage.GetFramesPerSecond(),
-        "startTimeCode": stage.GetStartTimeCode() if ranged else codes[0],
-        "endTimeCode": stage.GetEndTimeCode() if ranged else codes[-1],
-    }
+        "startTimeCode": min(codes[0], said.get("endTimeCode", codes[0])),
+        "endTimeCode": max(codes[-1], said.get("startTimeCode", codes[-1])),
+    } | said
     if not stage.GetDefaultPrim():  # otherwise it is repeated as the shot has it, which may be a path
         facts["defaultPrim"] = next(iter(stage.GetPseudoRoot().GetChildren())).GetName()
     repeat_metadata(stage.GetRootLayer(), layer, out, facts)

@@ -48,10 +48,16 @@ def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
                 f"{path.name}: its layer {layer.GetDisplayName()} {differs}: the first layer's count; author them there"
             )
             break
+    return notes + unit_notes(stage, path)
+
+
+def unit_notes(stage: Usd.Stage, path: Path) -> list[str]:
+    """The note on a stage of which no layer states the unit in effect."""
+    unit, layers = Border.of(stage).metres_per_unit, stage.GetLayerStack(includeSessionLayers=False)
     units = [layer.pseudoRoot.GetInfo(UNIT) for layer in stage.GetUsedLayers() if layer.pseudoRoot.HasInfo(UNIT)]
-    if border.metres_per_unit not in units and not any(layer.pseudoRoot.HasInfo(UNIT) for layer in layers):
-        notes.append(f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it")
-    return notes
+    if unit in units or any(layer.pseudoRoot.HasInfo(UNIT) for layer in layers):
+        return []
+    return [f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it"]
 
 
 def asked_notes(stage: Usd.Stage, rigs: Iterable[StageRig], codes: list[float], loop: bool) -> list[str]:

@@ -28,13 +28,23 @@ def other_hair(rigs: Sequence[StageRig]) -> list[str]:
     """A line for each prim of NURBS or Hermite curves that looks like hair: on a skin, or several curves near a head."""
     if not rigs:
         return []
-    every = Usd.PrimRange(rigs[0].source.prim.GetStage().GetPseudoRoot(), Usd.TraverseInstanceProxies())
-    others = [p for p in every if p.IsA(UsdGeom.NurbsCurves) or p.IsA(UsdGeom.HermiteCurves)]
-    return [
-        f"{prim.GetPath()}: its {prim.GetTypeName()} are left out; if they are hair, convert them to BasisCurves"
-        for prim in others[:MOST]
-        if _looks_like_hair(prim, rigs)
-    ]
+    others = _others(rigs[0].source.prim.GetStage())
+    return [_left_out(prim) for prim in others[:MOST] if _looks_like_hair(prim, rigs)]
+
+
+def of_other_kinds(stage: Usd.Stage) -> list[str]:
+    """The line on the first prim of NURBS or Hermite curves in a file of hair, with how many more there are."""
+    others = _others(stage)
+    return [_left_out(others[0]) + (f" ({len(others) - 1} more)" if len(others) > 1 else "")] if others else []
+
+
+def _others(stage: Usd.Stage) -> list[Usd.Prim]:
+    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    return [prim for prim in every if prim.IsA(UsdGeom.NurbsCurves) or prim.IsA(UsdGeom.HermiteCurves)]
+
+
+def _left_out(prim: Usd.Prim) -> str:
+    return f"{prim.GetPath()}: its {prim.GetTypeName()} are left out; if they are hair, convert them to BasisCurves"
 
 
 def drawn_as_copies(prims: Sequence[Usd.Prim]) -> tuple[dict[Usd.Prim, str], list[str]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from scipy.spatial.transform import Rotation
 
 from neuralocks_core.body.head_field import HeadField
 from neuralocks_core.errors import NeuralocksError
@@ -22,7 +23,7 @@ from usd.review.evaluate import evaluate
 from usd.shot.stage import read_rigs, read_shot
 
 from ..commands import status
-from ..shots import Recipe, edited, strand_points, world_points, write_shot
+from ..shots import Recipe, edited, place_skeleton, strand_points, world_points, write_shot
 
 SHOT = Path(__file__).resolve().parents[3] / "examples" / "shot" / "shot.usda"
 BODY = SHOT.with_name("body.usdc")
@@ -166,6 +167,36 @@ def test_a_layer_over_the_character_bakes_as_it_is(tmp_path, model, foreign):
     assert np.linalg.norm(world_points(out, 1.0, "/Groom_2/Bob") - head, axis=1).max() < 0.5
 
 
+def test_what_an_import_leaves_out_or_takes_for_granted_is_told(tmp_path):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "ribbons.usda"))
+    points = strand_points(30, 6)
+    hair = UsdGeom.BasisCurves.Define(stage, "/Hair/Locks")
+    hair.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
+    hair.CreateCurveVertexCountsAttr([6] * 30)
+    hair.CreateNormalsAttr([(0, 1, 0)] * 30)
+    for name, rows in (("front", range(15)), ("back", range(15, 30))):
+        UsdGeom.Subset.CreateGeomSubset(hair, name, "curve", list(rows), "materialBind")
+    for name in ("Guides", "More"):
+        UsdGeom.NurbsCurves.Define(stage, f"/Hair/{name}")
+    stage.DefinePrim("/Hair/Lost").GetReferences().AddReference("./nothing.usda")
+    stage.Save()
+    told = {
+        "no metersPerUnit, so a unit counts as a centimetre",
+        "its normals, which make ribbons, are not imported",
+        "its 2 subsets, such as front, are not imported",
+        "its NurbsCurves are left out; if they are hair, convert them to BasisCurves (1 more)",
+        "nothing.usda",
+    }
+    for options, without in (
+        ({}, set()),
+        ({"unit": "m"}, {"no metersPerUnit"}),
+        ({"character": BODY}, {"no metersPerUnit"}),
+    ):
+        _, notes = import_groom(tmp_path / "ribbons.usda", tmp_path / "out.usda", **options)
+        said = {text for text in told if any(text in note for note in notes)}
+        assert told - said == {text for text in told if any(text.startswith(each) for each in without)}, notes
+
+
 def test_parts_in_one_unknown_unit_keep_together(tmp_path):
     """A braid's few roots alone would be taken for another unit."""
     rng, files = np.random.default_rng(0), []
@@ -205,6 +236,28 @@ def test_hair_that_a_skeleton_carries_is_imported_where_skinning_shows_it(tmp_pa
     (groom,), _ = import_groom(edited(tmp_path, change, Recipe(strands=6, vertices=4)), tmp_path / "groom.usda")
     np.testing.assert_allclose(groom.points, rest + [3, 0, 0], atol=1e-6)
     np.testing.assert_allclose(groom.widths, 1e-4, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("size", "turn", "up"), [(0.01, (-90, 0, 0), 0), (1, (0, 15, 0), 0), (1, (0, 0, 0), 0.01)])
+def test_bind_transforms_may_be_in_the_worlds_space(size, turn, up, tmp_path, model):
+    """As USD means them, and Blender writes them: hair was imported 100 times too small, and grown hair turned on the head by 15
+    degrees.
+    """
+    recipe, place = Recipe(bound="own"), np.eye(4)
+    place[:3, :3], place[1, 3] = size * Rotation.from_euler("xyz", turn, degrees=True).as_matrix(), up
+    plain = write_shot(tmp_path / "plain", recipe)
+    placed = edited(tmp_path / "placed", lambda stage: place_skeleton(stage, place), recipe)
+    found = [import_groom(path, path.with_name("groom.usda"))[0][0] for path in (plain, placed)]
+    np.testing.assert_allclose(found[1].points, found[0].points, atol=1e-6)
+    np.testing.assert_allclose(found[1].widths, found[0].widths, rtol=1e-5)
+    outs = []
+    for path in (plain, placed):
+        grow("bob", path, path.with_name("grown.usda"), count=60, with_character=True)
+        outs.append(path.with_name("grown.usda"))
+        outs.append(bake(outs[-1], path.with_name("hair.usda"), model, grooms=["/Groom/bob"], frames="5").path)
+    for one, other in zip(outs[:2], outs[2:], strict=True):
+        points = [world_points(each, 5.0, "/Groom/bob") for each in (one, other)]
+        np.testing.assert_allclose(points[1], points[0], atol=2e-5)
 
 
 def test_a_range_that_the_character_lacks_is_not_made_up(tmp_path):

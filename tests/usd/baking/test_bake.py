@@ -292,3 +292,19 @@ def test_what_lies_over_a_shot_is_not_written_under_the_name_of_a_missing_layer_
         with pytest.raises(NeuralocksError, match=r"hair\.usdc: shot\.usda has it as a layer, and"):
             work()
     assert not out.exists() and not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("stated", [{"end": 48}, {"start": -12}, {"start": 60}])
+@pytest.mark.parametrize("frames", [None, "2:5"])
+def test_a_range_of_which_a_shot_states_one_end_keeps_it(stated, frames, tmp_path, model):
+    shot = write_shot(tmp_path)
+    layer = Sdf.Layer.FindOrOpen(str(shot))
+    for name, value in (("startTimeCode", stated.get("start")), ("endTimeCode", stated.get("end"))):
+        layer.pseudoRoot.ClearInfo(name)
+        if value is not None:
+            layer.pseudoRoot.SetInfo(name, float(value))
+    layer.Save()
+    stage = Usd.Stage.Open(str(bake(shot, tmp_path / "hair.usda", model, frames=frames).path))
+    first, last = (1, 9) if frames is None else (2, 5)
+    wanted = stated.get("start", first), max(stated.get("end", last), stated.get("start", last))
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == wanted
