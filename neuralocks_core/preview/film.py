@@ -273,6 +273,10 @@ class Film:
 
 
 def _blurred(values: np.ndarray, width: float) -> np.ndarray:
+    """Values (n, 3) smoothed over about so many samples; at both ends they go on as they went, so that nobody runs out of the picture."""
     from scipy.ndimage import gaussian_filter1d
 
-    return gaussian_filter1d(values, max(width, 1e-3), axis=0, mode="nearest")
+    width = max(width, 1e-3)
+    beyond = min(len(values) - 1, int(4 * width) + 1)
+    longer = np.pad(values, ((beyond, beyond), (0, 0)), mode="reflect", reflect_type="odd")
+    return gaussian_filter1d(longer, width, axis=0, mode="nearest")[beyond : beyond + len(values)]

@@ -67,6 +67,11 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None, b
     moving = [rig for rig in rigs if len(rig.clip.times) > 1]
     if not moving:
         raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
+    if notes is not None and len(moving) > 1:
+        notes.append(
+            f"{Path(path).name}: {moving[0].path} is learned from, and not the other {len(moving) - 1} that move in it, such as "
+            f"{moving[1].path}; give each a file of its own"
+        )
     if stops := without_turn(moving[0]):
         raise NeuralocksError(stops[0])
     return _on(character, moving[0], Path(path), notes)

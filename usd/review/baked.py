@@ -82,11 +82,15 @@ class Baked:
             self.world(item, self.codes[frame]), np.linalg.inv(item.attachment.character.canonical_to_world(joints))
         )
 
+    @property
+    def shown(self) -> list[StageGroom]:
+        """The grooms that are not hidden; all, if all are."""
+        return [item for item in self.shot.grooms if drawn(item.prim)] or list(self.shot.grooms)
+
     def scene(self) -> Scene:
         """All grooms of the first groom's skeleton and its body, for a preview; hidden ones only if nothing else is there."""
-        seen = [item for item in self.shot.grooms if drawn(item.prim)] or self.shot.grooms
-        first = seen[0].attachment
-        items = [item for item in seen if item.attachment.rig is first.rig]
+        first = self.shown[0].attachment
+        items = [item for item in self.shown if item.attachment.rig is first.rig]
         character, rig = first.character, first.rig
         body = character.body if character.body is not None and len(character.body.points) <= MOST_BODY_POINTS else None
         head = np.stack([character.carrying(rig.joints_at(code)) for code in self.codes])

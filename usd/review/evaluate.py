@@ -80,6 +80,7 @@ def evaluate(
             if reference and len(own.codes) >= 3:
                 rows, tips = subject.compared(look, beside and beside.of(item))
                 compared[item.path] = rows
+                notes += subject.crowded()
                 curves[item.path] |= tips
     rows = (_in_stage_order(baked, each) for each in (measured, compared, curves))
     return Card(str(baked.shot.path), *rows, tuple(notes))

@@ -23,7 +23,7 @@ from ..border.units import Border
 from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
 from ..shot.curves import find_curves
-from .baked import Baked, read_baked
+from .baked import MOST_BODY_POINTS, Baked, read_baked
 
 SIDES = 16, 4096
 """Least and largest width and height of a picture [pixels]."""
@@ -55,7 +55,7 @@ def preview(
         size: width and height of one picture in pixels, such as (440, 620).
         view: where the camera is: degrees from the face to the character's left.
         turntable: whether the camera goes round once.
-        tell: called with the note on characters whose hair is not drawn.
+        tell: called with notes on what is not drawn.
         progress: called with (done, total, message).
 
     Raises:
@@ -106,14 +106,20 @@ def _samples(frames: str | None, times: np.ndarray, border: Border, path: Path) 
 
 
 def _strands(baked: Baked, tell) -> tuple[drawing.Scene, Border]:
-    rigs = list(dict.fromkeys(item.attachment.rig.path for item in baked.shot.grooms))
-    if tell and len(rigs) > 1:
-        tell(
-            [
-                f"{rigs[0]}: the first of {len(rigs)} characters is drawn; choose another, such as {rigs[1]}, with --skeleton PRIM"
-            ]
+    scene, notes = baked.scene(), []
+    every = (item.attachment.rig.path for item in baked.shot.grooms)
+    drawn, *others = dict.fromkeys([baked.shown[0].attachment.rig.path, *every])
+    if others:
+        notes.append(
+            f"{drawn}: one of {1 + len(others)} characters is drawn; choose another, such as {others[0]}, with --skeleton PRIM"
         )
-    return baked.scene(), baked.shot.border
+    if scene.body is None and (body := baked.shown[0].attachment.character.body) is not None:
+        notes.append(
+            f"{drawn}: its body has {len(body.points)} points, more than {MOST_BODY_POINTS}, so only its hair is drawn"
+        )
+    if tell and notes:
+        tell(notes)
+    return scene, baked.shot.border
 
 
 def _scene(path, grooms, skeleton, head, tell) -> tuple[drawing.Scene, Border]:

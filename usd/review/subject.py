@@ -156,6 +156,21 @@ class Subject:
             "jitter_mm": max(metrics.jitter(self.moved[frames]) for frames in quiet) if quiet else float("nan"),
         }
 
+    def crowded(self) -> list[str]:
+        """The note on hair that was kept apart, if the reference has only some of its strands."""
+        few, every = len(self.strands.whole_locks(REFERENCE_STRANDS)), len(self.strands.length)
+        if not self.volume or few == every:
+            return []
+        return [
+            f"{self.item.path}: its {every} strands were kept apart (--volume {self.volume:g}), the reference's {few} crowd less, so it "
+            "differs from a simulation by more than its motion"
+        ]
+
+    @property
+    def volume(self) -> float:
+        """How strongly the bake records that strands were kept apart."""
+        return recorded_volume(self.item.prim)
+
     def compared(self, material: Material, model: StrandModel | None) -> tuple[dict, dict]:
         """Rows and tip curves compared with the reference."""
         strands, times = self.strands, self.baked.times
@@ -169,7 +184,7 @@ class Subject:
         known = np.concatenate([[begun], times])
         if self._wind and not clip.loop:
             known[0] -= comparison.BLOWN
-        felt = {"wind": self._wind, "volume": recorded_volume(self.item.prim)}
+        felt = {"wind": self._wind, "volume": self.volume}
         true = comparison.simulated(self.character, some, clip, known, material, **felt, progress=self.say)[1:]
         answers = {"bake": self.moved[:, few], "held pose": self._held(material, model, few)}
         answers["rigid"] = np.zeros_like(true)

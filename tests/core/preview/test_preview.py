@@ -194,6 +194,16 @@ def test_no_camera_flies_across_a_cut():
             assert (camera.axes[:, 2] @ head[frame, :3, 2]) > 0.9
 
 
+def test_nobody_who_runs_leaves_the_picture_at_its_ends():
+    """The smooth path lagged behind there by half a metre."""
+    person = scene(48)
+    head = np.tile(np.eye(4), (48, 1, 1))
+    head[:, 0, 3] = 6 * person.times
+    with closing(Film(replace(person, head=head), 62, 62, SMALL, 0.3, plain_canvas.PlainCanvas)) as film:
+        away = film._aims - head[:, :3, 3]
+        assert np.abs(away - away[24]).max() < 1e-6
+
+
 def test_the_picture_of_usual_hair_is_as_near_as_its_length_asks_for():
     with closing(Film(scene(), 62, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
         reach = np.linalg.norm(film.scene.rest - CENTRE, axis=1).max()

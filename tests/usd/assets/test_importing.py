@@ -197,6 +197,18 @@ def test_what_an_import_leaves_out_or_takes_for_granted_is_told(tmp_path):
         assert told - said == {text for text in told if any(text.startswith(each) for each in without)}, notes
 
 
+@pytest.mark.parametrize("basis", ["hermite", "power", "b-spline"])
+def test_curves_of_an_unknown_basis_are_imported(basis, tmp_path):
+    """USD's own count of their values divides by zero, which ended the program without a word."""
+    shot = edited(tmp_path, lambda stage: stage.GetPrimAtPath("/Hero/Hair").GetAttribute("type").Set("cubic"))
+    layer = Sdf.Layer.FindOrOpen(str(shot))
+    Sdf.CreatePrimAttributeInLayer(layer, "/Hero/Hair.basis", Sdf.ValueTypeNames.Token, Sdf.VariabilityUniform)
+    layer.GetAttributeAtPath("/Hero/Hair.basis").default = basis
+    layer.Save()
+    (groom,), _ = import_groom(shot, tmp_path / "out.usda")
+    assert groom.strand_count == 40
+
+
 def test_parts_in_one_unknown_unit_keep_together(tmp_path):
     """A braid's few roots alone would be taken for another unit."""
     rng, files = np.random.default_rng(0), []

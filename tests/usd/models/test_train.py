@@ -230,6 +230,19 @@ def test_no_training_flies_across_the_cuts_of_a_capture(tmp_path):
     assert fastest < 0.1
 
 
+def test_a_second_moving_skeleton_is_told(tmp_path):
+    path, notes = write_shot(tmp_path, Recipe(bound="mesh")), []
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    for name in ("Anna", "Bert"):
+        stage.DefinePrim(f"/{name}").GetReferences().AddReference(str(path), "/Hero")
+    stage.Save()
+    read_clip(str(tmp_path / "two.usda"), read_rigs(path)[0].character, notes)
+    (told,) = [note for note in notes if "learned from" in note]
+    assert told.startswith(
+        "two.usda: /Anna/Rig is learned from, and not the other 1 that move in it, such as /Bert/Rig"
+    )
+
+
 @pytest.mark.parametrize("change", ["turned", "halved"])
 def test_motion_of_the_same_joints_in_other_axes_or_places_moves_the_character_alike(tmp_path, change):
     """Two exporters give one rig other joint axes; another person's rig may have the same names."""

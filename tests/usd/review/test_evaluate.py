@@ -13,6 +13,7 @@ from neuralocks_core.materials import Material
 from usd.baking.bake import bake
 from usd.baking.simulate import simulate
 from usd.cli.app import main
+from usd.review import subject
 from usd.review.baked import read_baked
 from usd.review.demo import demo, shipped_shot
 from usd.review.evaluate import evaluate
@@ -88,14 +89,18 @@ def test_a_loop_is_compared_with_a_loop(tmp_path, model):
     assert off[True] < 5e-4 < 5e-3 < off[False]
 
 
-def test_a_simulation_is_compared_with_the_solver_as_it_was(tmp_path):
+def test_a_simulation_is_compared_with_the_solver_as_it_was(tmp_path, monkeypatch):
     """The solver keeps strands apart if the bake records that."""
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
     shot = write_shot(tmp_path, Recipe(frames=24, vertices=24))
     for volume in (0.0, 3.0):
         simulate(shot, tmp_path / "hair.usdc", volume=volume)
-        rows = evaluate(tmp_path / "hair.usdc", reference=True).compared["/Hero/Hair"]
+        card = evaluate(tmp_path / "hair.usdc", reference=True)
+        rows = card.compared["/Hero/Hair"]
         assert rows["bake"]["motion_error_median"] < 0.004 and rows["bake"]["position_percent"] < 0.1, volume
+        assert not any("crowd less" in note for note in card.notes)
+    monkeypatch.setattr(subject, "REFERENCE_STRANDS", 20)
+    assert sum("crowd less" in note for note in evaluate(tmp_path / "hair.usdc", reference=True).notes) == 1
 
 
 def coiled(path, strands=12, vertices=150):

@@ -10,6 +10,7 @@ from pxr import Sdf, Usd, UsdGeom
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.cli.app import preview_command
+from usd.review import baked as reading
 from usd.review import picture
 from usd.review.baked import read_baked
 
@@ -29,13 +30,15 @@ def test_it_tells_whose_hair_is_not_drawn(tmp_path, monkeypatch):
     stage.Save()
     bake(both, tmp_path / "hair.usda", frames="1:2")
     picture.preview(tmp_path / "hair.usda", "hair.png", tell=told.extend)
-    assert told == [
-        "/Anna/Rig: the first of 2 characters is drawn; choose another, such as /Bert/Rig, with --skeleton PRIM"
-    ]
+    assert told == ["/Anna/Rig: one of 2 characters is drawn; choose another, such as /Bert/Rig, with --skeleton PRIM"]
     told.clear()
     picture.preview(tmp_path / "hair.usda", "hair.png", skeleton="/Bert/Rig", tell=told.extend)
     picture.preview(tmp_path / "hair.usda", "hair.png", grooms=["/Anna/Hair"], tell=told.extend)
     assert told == []
+    for module in (picture, reading):
+        monkeypatch.setattr(module, "MOST_BODY_POINTS", 100)
+    picture.preview(tmp_path / "hair.usda", "hair.png", skeleton="/Bert/Rig", tell=told.extend)
+    assert told == ["/Bert/Rig: its body has 416 points, more than 100, so only its hair is drawn"]
 
 
 @pytest.fixture(scope="module")
