@@ -14,6 +14,7 @@ from .scene import blur
 from .scene.appended import remake
 from .scene.attach import switch_changed
 from .scene.carried import bodies_of
+from .scene.keyed import concerns, users_of
 from .scene.last_called import go_last, others_called
 from .scene.layers import working_in
 from .scene.lively import lively
@@ -73,8 +74,11 @@ def on_update(scene, graph):
     meshes = {u.id.name_full for u in graph.updates if isinstance(u.id, bpy.types.Mesh) and u.is_updated_geometry}
     bodies = [body.data for a in live.carriers(scene) for body in bodies_of(a, scene)] if meshes else ()
     edited = any(mesh.name_full in meshes and not follows(mesh, originals) for mesh in bodies)
-    if edited or any(isinstance(thing, bpy.types.Action) and thing.name_full not in switched for thing in changed):
-        _mark_stale()
+    keys = [
+        thing.original for thing in changed if isinstance(thing, bpy.types.Action) and thing.name_full not in switched
+    ]
+    if edited or keys:
+        _mark_stale([] if edited else users_of(keys))
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
         session.wanting = session.wanting or bool(session.failed)
         session.failed.clear()
@@ -187,12 +191,14 @@ def _unseen(change):
         session.paused -= 1
 
 
-def _mark_stale() -> None:
-    for sampled in session.rigs.values():
+def _mark_stale(users: list[set]) -> None:
+    """Motions are out of date, of all rigs or of those that keys with these users may move."""
+    found = [rig for rig in session.rigs.values() if not users or any(concerns(own, rig.moved_by) for own in users)]
+    for sampled in found:
         sampled.stale = True
     session.edits += 1
     session.failed.clear()
-    session.wanting = True
+    session.wanting = session.wanting or bool(found) or not session.rigs
 
 
 def _catch_up() -> None:

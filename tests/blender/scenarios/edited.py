@@ -257,6 +257,40 @@ def read_by_number(_folder: Path) -> None:
     assert session.rigs["Rig"].stale
 
 
+def keyed_elsewhere(_folder: Path) -> None:
+    """Keys of a camera, a lamp or another character leave a motion as it is; those of what moves it, or may move it, do not."""
+    from dcc_addon.session import session
+
+    scene, rigs = bpy.context.scene, [scenes.armature(), scenes.armature()]
+    for rig in rigs:
+        scenes.dance(rig)
+        make_live(rig, scenes.hair(rig, 20))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Lens"))
+    empty = bpy.data.objects.new("Empty", None)
+    for thing in (camera, empty):
+        scene.collection.objects.link(thing)
+
+    def told(owner, path: str) -> list[bool]:
+        for rig in rigs:
+            session.rigs[rig.name].stale = False
+        for frame, value in ((3, 1.0), (9, 2.0)):
+            setattr(owner, path, (value, 0.0, 0.0) if path == "location" else value)
+            owner.keyframe_insert(path, frame=frame)
+        bpy.context.view_layer.update()
+        return [session.rigs[rig.name].stale for rig in rigs]
+
+    neither, both = [False, False], [True, True]
+    assert told(camera, "location") == told(camera.data, "lens") == neither
+    assert told(rigs[0], "location") == [True, False] and told(rigs[1], "location") == [False, True]
+    assert told(empty, "location") == both, "what node groups name is not known"
+    rigs[0].constraints.new("COPY_LOCATION").target = camera
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    for rig in rigs:
+        scene.neuralocks.armature = rig
+        assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert told(camera, "location") == [True, False]
+
+
 def hidden_prop(folder: Path) -> None:
     """A prop hidden by a scale of zero does not prevent a bake; a hidden bone that moves hair gets a message."""
     prop = [*scenes.BONES, ("prop", "forearm.L", (0.5, 0, 1.2), (0.6, 0, 1.2))]
