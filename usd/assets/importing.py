@@ -25,7 +25,8 @@ from ..border.stopping import check
 from ..border.units import Border
 from ..shot.curve_ends import beyond_ends
 from ..shot.curves import find_curves, read_groom, widths_attribute, without_points
-from ..shot.groom_notes import no_points
+from ..shot.groom_notes import groom_notes, no_points
+from ..shot.lacking import no_groom
 from ..shot.notes import composition_notes, few, first_of, unit_notes, unlikely_head
 from ..shot.other_curves import of_other_kinds
 from ..shot.rig_controls import open_curves
@@ -95,7 +96,7 @@ def import_groom(
     notes += told
     for number, path in enumerate(sources):
         say((_READ if rig else _LAID) * number // len(sources), 1000, f"reading {path.name}")
-        read, told = _read(path, out, counted, up, rig is not None)
+        read, told = _read(path, out, counted, up, rig is not None and unit is None)
         found += read
         notes += told
     if rig:
@@ -201,7 +202,7 @@ def _read_usd(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Auth
     metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
     border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
     found, notes, left = [], composition_notes(stage, source), []
-    notes += unit_notes(stage, source) if unit is None and not sized else []
+    notes += [] if sized or unit is not None else unit_notes(stage, source)
     every = find_curves(stage)
     hair = open_curves(every)
     closed, empty = [prim for prim in every if prim not in hair], without_points(hair)
@@ -215,12 +216,13 @@ def _read_usd(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Auth
     for prim in (prim for prim in hair if prim not in empty):
         curves = UsdGeom.BasisCurves(prim)
         groom = read_groom(prim, border.to_core @ _place(prim), notes)
+        notes += [] if sized else groom_notes(prim, groom, border)
         if widths_attribute(curves).ValueMightBeTimeVarying():
             notes.append(f"{prim.GetPath()}: its widths change over time; the first ones are imported")
         tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
         found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left), beyond_ends(prim)))
     if not found:
-        raise NeuralocksError(f"{source}: holds no BasisCurves; give a file with hair curves")
+        raise no_groom(stage, source, "give a file with hair curves")
     return found, notes + _reversed(source, stage) + few(left, "primvars and materials are not imported like that")
 
 

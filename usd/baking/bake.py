@@ -4,7 +4,7 @@
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
@@ -104,7 +104,7 @@ def bake(
     def facts(item: StageGroom) -> dict:
         return {"model": digests[item.path][:12], **alike}
 
-    moved = [(each, replace(shot, grooms=tuple(items))) for each, items in models]
+    moved = [(each, [item.attachment for item in items]) for each, items in models]
     untrue = {note for each in moved for note in learned(*each)}
     known = known_notes(shot, codes, loop, (loop or cuts is None) and movers.asked.spec.bins)
     notes = [

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Notes on a model for the shot to bake: what it did not learn, and which settings it ignores."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from neuralocks_core.materials import Material
@@ -10,21 +11,22 @@ from neuralocks_core.runtime import StrandModel
 from ..shot.attach import Attachment, off_head
 from ..shot.character_notes import untrained
 from ..shot.notes import without_strength
-from ..shot.stage import Shot
 from ..skel.stage_rig import StageRig
 
 
-def model_notes(model: StrandModel, material: Material, shot: Shot, strength: float = 1.0) -> list[str]:
-    """What a user of a model should know: its report, how material and characters differ from what it learned, and whether motion
-    strength acts.
+def model_notes(
+    model: StrandModel, material: Material, moved: Iterable[Attachment], strength: float = 1.0
+) -> list[str]:
+    """What a user of a model should know: its report, how material and the characters that carry the hair which it moves differ from
+    what it learned, and whether motion strength acts.
     """
     unmoved = without_strength(strength, model.meta.get("static") is not True)
-    return [*_unheard(model, material), *unmoved, *_other_bodies(model, shot), *model.file.shortcomings()]
+    return [*_unheard(model, material), *unmoved, *_other_bodies(model, moved), *model.file.shortcomings()]
 
 
-def learned(model: StrandModel, shot: Shot) -> list[str]:
+def learned(model: StrandModel, moved: Iterable[Attachment]) -> list[str]:
     """Those of a shot's notes that do not hold for a model: of characters whose measures it was trained on."""
-    carriers = {item.attachment.character: item.attachment for item in shot.grooms}  # not each groom: they are measured
+    carriers = {each.character: each for each in moved}  # not each groom: they are measured
     found = [each for each in carriers.values() if not off_head(each)]
     known = [each for each in found if model.knows(each.character, each.rig.clip)]
     return [note for each in known for note in untrained(_with_head(each))]
@@ -43,10 +45,9 @@ def _unheard(model: StrandModel, material: Material) -> list[str]:
     ]
 
 
-def _other_bodies(model: StrandModel, shot: Shot) -> list[str]:
+def _other_bodies(model: StrandModel, moved: Iterable[Attachment]) -> list[str]:
     """The notes on characters whose measures differ from those that a model was trained on."""
-    found = [item.attachment for item in shot.grooms]
-    on_heads = {each.rig.path: each for each in found if not off_head(each)}  # a chest does not have a head's measures
+    on_heads = {each.rig.path: each for each in moved if not off_head(each)}  # a chest does not have a head's measures
     own = model.file.path in (shipped(), *specialists())
     remedy = "use the shipped model, or train one on this character"
     if own:  # of those whose size no model knows, the shot's notes tell

@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a stage's grooms are, how they were baked, and what is wrong with them."""
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 from pxr import UsdGeom
 
 from neuralocks_core.deformation.suited import suited
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.materials import Material
+from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
 
+from ..baking.model_notes import model_notes
 from ..border.placement import Placement
 from ..border.units import Border
 from ..border.values import as_numbers
@@ -79,14 +85,20 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     if beyond is not None:
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
     if joint:
-        joint["shipped model"] = suited(None, found.character, groom).stem
-        spoils += groom_notes(prim, groom, border)
+        mover = suited(None, found.character, groom)
+        joint["shipped model"] = mover.stem
+        spoils += groom_notes(prim, groom, border) + model_notes(_loaded(mover), Material(), [found])
     if found:
         spoils += baked_from_others(prim, found, groom)
     made = recorded(prim)
     baked = {"samples": _samples(prim, border), "baked with": made} if made else {}
     spoils += retimed(prim) + _unfit(prim) if made else []
     return facts | joint | groom_facts(groom) | baked
+
+
+@cache
+def _loaded(path: Path) -> StrandModel:
+    return StrandModel.load(path)
 
 
 def _samples(prim, border: Border) -> dict:

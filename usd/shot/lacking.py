@@ -19,15 +19,16 @@ MOST_VARIANTS = 64
 """Variants that are tried: each composes the stage anew."""
 
 
-def no_groom(stage: Usd.Stage, path: Path) -> NeuralocksError:
-    """The error for a stage without BasisCurves."""
+def no_groom(
+    stage: Usd.Stage, path: Path, otherwise: str = "add one, or import a hair file with 'neuralocks import'"
+) -> NeuralocksError:
+    """The error for a stage without BasisCurves; `otherwise` is the remedy if nothing in it is likely to be hair."""
     other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
     switched_off = _switched_off(stage, UsdGeom.BasisCurves)
     remedy = _in_a_variant(stage) or switched_off or _on_joints(stage)
     if other and not switched_off:
         remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
-    remedy = remedy or "add one, or import a hair file with 'neuralocks import'"
-    return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy)
+    return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy or otherwise)
 
 
 def no_skeleton(stage: Usd.Stage, path: Path) -> NeuralocksError:

@@ -11,6 +11,7 @@ from neuralocks_core.measures import body_measures
 from neuralocks_core.runtime import StrandModel
 from usd.baking.bake import bake
 from usd.baking.model_notes import model_notes
+from usd.review.inspect import inspect
 from usd.shot import character_notes
 from usd.shot.stage import read_shot
 
@@ -27,9 +28,14 @@ def test_a_character_without_a_measurable_body_is_told_elsewhere(model, tmp_path
     assert _notes(model, shot, {"measures": {"lowest": [0.5] * 10, "highest": [0.6] * 10}}) == []
 
 
+def carried(shot) -> list:
+    return [item.attachment for item in shot.grooms]
+
+
 def _notes(model, shot, card: dict) -> list[str]:
     plain = StrandModel.load(model).file
-    return model_notes(StrandModel(replace(plain, meta=plain.meta | {"training": card})), Material(), shot)
+    mine = StrandModel(replace(plain, meta=plain.meta | {"training": card}))
+    return model_notes(mine, Material(), carried(shot))
 
 
 def _learned(shot, **changes) -> dict:
@@ -54,6 +60,13 @@ def test_a_model_of_another_body_is_told(model, shot):
     assert "upper arm half distance" in note
 
 
+def test_inspect_tells_what_a_bake_does(tmp_path):
+    """It promised what would spoil a bake, and the bake then said more."""
+    path = write_shot(tmp_path)
+    (note,) = [note for note in bake(path, tmp_path / "hair.usda", frames="1:1").notes if "another body" in note]
+    assert note in inspect(path)["spoils"]
+
+
 def test_a_character_that_the_model_was_trained_on_is_none_that_no_model_knows(model, tmp_path, monkeypatch):
     """Training on it is what that note advises: with such a model it must be gone."""
     monkeypatch.setattr(character_notes, "HIGHEST", np.full(10, 0.01))
@@ -76,8 +89,8 @@ def test_a_card_may_hold_anything(model, shot, measures):
 def test_a_material_that_was_never_learned_is_told(model, shot):
     plain = StrandModel.load(model).file
     one = StrandModel(replace(plain, meta=plain.meta | {"training": {"options": {"random_materials": False}}}))
-    assert model_notes(one, Material(clumping=0.5), shot) == [] == model_notes(one, Material(), shot)
-    (note,) = model_notes(one, replace(Material(), weight=2 * Material.weight), shot)
+    assert model_notes(one, Material(clumping=0.5), carried(shot)) == [] == model_notes(one, Material(), carried(shot))
+    (note,) = model_notes(one, replace(Material(), weight=2 * Material.weight), carried(shot))
     assert "stiffness, weight and damping change nothing" in note
 
 
@@ -86,7 +99,7 @@ def test_the_shipped_model_does_not_advise_itself(shot):
     plain = StrandModel.load()
     changed = _learned(shot, highest={0: 0.05}, lowest={0: 0.04})
     one = StrandModel(replace(plain.file, meta=plain.meta | {"training": changed}))
-    (note,) = model_notes(one, Material(), shot)
+    (note,) = model_notes(one, Material(), carried(shot))
     assert note.endswith("if hair moves oddly or lies in the body, train one on this character")
     (note,) = _notes(plain.file.path, shot, changed)
     assert note.endswith("train one on this character") and "use the shipped" not in note
@@ -95,6 +108,10 @@ def test_the_shipped_model_does_not_advise_itself(shot):
 def test_strength_that_a_model_of_held_poses_does_not_feel_is_told(model, shot):
     plain = StrandModel.load(model).file
     still, moving = (StrandModel(replace(plain, meta=plain.meta | {"static": static})) for static in (True, False))
-    (note,) = model_notes(still, Material(), shot, strength=2.0)
+    (note,) = model_notes(still, Material(), carried(shot), strength=2.0)
     assert note.startswith("motion strength: has no effect on a model of held poses")
-    assert model_notes(still, Material(), shot) == [] == model_notes(moving, Material(), shot, strength=2.0)
+    assert (
+        model_notes(still, Material(), carried(shot))
+        == []
+        == model_notes(moving, Material(), carried(shot), strength=2.0)
+    )
