@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
-from usd.review.inspect import inspect
 from usd.rig.notes import rigged_notes
 from usd.shot.stage import read_shot
 
+from ..commands import spoils
 from ..shots import CENTRE, JOINTS, Recipe, add_curves, write_shot
 
 LIES = "/Hero/Rig: lies down in its bind pose"
@@ -19,9 +19,7 @@ ELBOWS = {"left_lower_arm": "arm_twist_L", "right_lower_arm": "arm_twist_R"}
 
 def _said(path, words) -> list[str]:
     """The notes with these words, the same for a bake and for `inspect`."""
-    noted, told = (
-        [note for note in notes if words in note] for notes in (read_shot(path).notes, inspect(path)["spoils"])
-    )
+    noted, told = ([note for note in notes if words in note] for notes in (read_shot(path).notes, spoils(path)))
     assert noted == told
     return noted
 
@@ -141,7 +139,7 @@ def test_fur_beside_the_hair_says_nothing_false_of_the_head(tmp_path, wider):
     low = points[chest & (points[:, 1] < 1.3)]
     add_curves(stage, "/Hero/Fur", np.stack([low, low + [0, 0, 0.02]], axis=1))
     stage.Save()
-    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+    for notes in (read_shot(path).notes, spoils(path)):
         assert set(notes) - set(hair) == {"/Hero/Fur: rides on 'spine', not on a head"}
     assert read_shot(path, head="spine").grooms[1].joint == "hips/spine"
     assert not any("rides on" in note for note in read_shot(path, head="spine").notes), (
@@ -164,7 +162,7 @@ def test_arms_that_no_joint_continues_are_told_to_count_as_straight(tmp_path):
 def test_a_joint_of_two_meanings_is_told(tmp_path):
     path = write_shot(tmp_path)
     for joints, told in (({"neck": "head"}, ["head and neck"]), ({"neck": "neck"}, [])):
-        for notes in (read_shot(path, joints=joints).notes, inspect(path, joints=joints)["spoils"]):
+        for notes in (read_shot(path, joints=joints).notes, spoils(path, joints=joints)):
             said = [note for note in notes if "at once" in note]
             assert said == [f"/Hero/Rig: joint 'head' is {each} at once; check --joint and --head" for each in told]
 

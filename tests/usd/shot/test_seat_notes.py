@@ -11,11 +11,11 @@ from scipy.spatial import cKDTree
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
-from usd.review.inspect import inspect
 from usd.shot import seat_notes
 from usd.shot.stage import read_shot
 from usd.skel import stage_rig
 
+from ..commands import spoils
 from ..shots import CENTRE, RADIUS, Recipe, write_shot
 
 
@@ -28,7 +28,7 @@ def test_strands_from_tip_to_root_are_told(tmp_path, bound):
     strands = np.array(points.Get()).reshape(40, -1, 3)
     points.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(strands[:, ::-1].reshape(-1, 3))))
     stage.Save()
-    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+    for notes in (read_shot(path).notes, spoils(path)):
         assert sum("from tip to root" in note for note in notes) == 1
 
 
@@ -43,7 +43,7 @@ def _from_to(path, roots: tuple, tips: tuple, *, turned: bool) -> list[str]:
     UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points))
     stage.Save()
     shot = read_shot(path)
-    assert set(shot.notes) == set(inspect(path)["spoils"])
+    assert set(shot.notes) == set(spoils(path))
     assert shot.grooms[0].joint.endswith("head")
     return [note for note in shot.notes if note.startswith("/Hero/Hair")]
 
@@ -102,7 +102,7 @@ def test_bound_hair_far_from_the_skin_is_told(tmp_path):
     points = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")).GetPointsAttr()
     points.Set(Vt.Vec3fArray.FromNumpy(np.array(points.Get()) + np.float32([5, 0, 0])))
     stage.Save()
-    for notes in (read_shot(path).notes, inspect(path)["spoils"]):
+    for notes in (read_shot(path).notes, spoils(path)):
         told = [note for note in notes if "geomBindTransform" in note]
         assert len(told) == 1 and told[0].startswith(
             "/Hero/Hair: its skel binding puts its roots 4.8 m from the skin of"
@@ -116,9 +116,7 @@ def test_hair_that_points_cannot_place_is_told(tmp_path):
         stage = Usd.Stage.Open(str(path))
         moved(stage)
         stage.Save()
-        found = [
-            [note for note in notes if "tremble" in note] for notes in (read_shot(path).notes, inspect(path)["spoils"])
-        ]
+        found = [[note for note in notes if "tremble" in note] for notes in (read_shot(path).notes, spoils(path))]
         assert found[0] == found[1]
         return found[0]
 
