@@ -3,6 +3,10 @@
 opened again, and without sampling the motion again.
 """
 
+import os
+import zlib
+from functools import lru_cache
+
 import bpy
 import numpy as np
 
@@ -17,16 +21,19 @@ MOST = 2000
 """Most frames of which is stored how the head stood."""
 NEAR = 1e-3
 """Turns [rad] and ways, in Blender's units, that are not told from none."""
+PIECES, PIECE = 256, 64
+"""A file is known by so many pieces of so many bytes: a whole bake would take seconds to read, and no two are alike in all of these."""
 RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press {} again"
 BEYOND = "frames {first} to {last} were baked, and this one was not; to let it move here, press {} again"
+ANOTHER = "its file was baked anew after this Blender file was saved, perhaps from other animation; press {} again"
 MOVED = (
     "in this frame the head is not where it was when the hair was baked; if the animation was changed, press {} again"
 )
 
 
-def remember(block, armature, scene, frames: tuple[int, int]) -> dict:
-    """Store with a bake of these frames, first and last, the scene's timing and how the head of this armature stands in them, in the
-    motion that was sampled for it; returns what is stored.
+def remember(block, armature, scene, frames: tuple[int, int], path: str = "") -> dict:
+    """Store with a bake of these frames, first and last, the scene's timing, how the head of this armature stands in them, in the motion
+    that was sampled for it, and which file is at `path`, if it is one; returns what is stored.
     """
     sampled = session.rigs[armature.name_full]
     head, numbers = sampled.character.head, sampled.motion.frames
@@ -38,17 +45,20 @@ def remember(block, armature, scene, frames: tuple[int, int]) -> dict:
         "last": int(frames[1]),
         "timing": _timing(scene),
         "heads": stood[:, :3].ravel().tolist(),
+        "file": _print_of(path),
     }
     block[KEY] = told
     return told
 
 
-def changed(told, armature, scene, remedy: str) -> str:
-    """What was changed since a bake, of which `told` was stored, and shows in this frame, with the remedy; empty if nothing is known
-    to be.
+def changed(told, armature, scene, remedy: str, path: str = "") -> str:
+    """What was changed since a bake, of which `told` was stored, perhaps in the file at `path`, and shows in this frame, with the remedy;
+    empty if nothing is known to be.
     """
     if not told or armature is None:
         return ""
+    if _print_of(path) not in ("", told["file"]):
+        return ANOTHER.format(remedy)
     first, last, frame = told["first"], told["last"], shown_frame(scene)
     if not np.allclose(list(told["timing"]), _timing(scene), rtol=1e-6, atol=0):
         return RETIMED.format(remedy)
@@ -72,6 +82,25 @@ def _moved(told, armature, scene, frame: float) -> bool:
     return bool(
         np.abs(off[:, :3]).max() > NEAR * size or (np.abs(off[:, 3]) > NEAR * (1 + np.abs(stood[row, :, 3]))).any()
     )
+
+
+def _print_of(path: str) -> str:
+    """A number of a file's content; empty if there is none."""
+    try:
+        state = os.stat(path)
+        return _print(path, state.st_mtime_ns, state.st_size)
+    except OSError:
+        return ""
+
+
+@lru_cache(64)
+def _print(path: str, _written: int, size: int) -> str:
+    number = zlib.crc32(str(size).encode())
+    with open(path, "rb") as file:
+        for place in np.linspace(0, max(size - PIECE, 0), PIECES).astype(int).tolist():
+            file.seek(place)
+            number = zlib.crc32(file.read(PIECE), number)
+    return f"{number:08x}"
 
 
 def _timing(scene) -> list[float]:

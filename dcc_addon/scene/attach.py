@@ -58,8 +58,9 @@ def changed_since(thing, scene) -> str:
     cache = thing.modifiers[MODIFIER].cache_file if has_cache(thing) else None
     if cache is None:
         return ""
-    told = session.baked.get(_place(cache), cache.get(as_baked.KEY))
-    return as_baked.changed(told, thing.neuralocks_hair.armature, scene, "Bake and Attach")
+    path = _place(cache)
+    told = session.baked.get(path, cache.get(as_baked.KEY))
+    return as_baked.changed(told, thing.neuralocks_hair.armature, scene, "Bake and Attach", path)
 
 
 def players(path: str) -> list:
@@ -197,7 +198,8 @@ def _cache_file(path: str):
 
 def _remember(hair, cache, scene, frames: tuple[int, int]) -> None:
     if hair.neuralocks_hair.armature is not None:
-        session.baked[_place(cache)] = as_baked.remember(cache, hair.neuralocks_hair.armature, scene, frames)
+        path = _place(cache)
+        session.baked[path] = as_baked.remember(cache, hair.neuralocks_hair.armature, scene, frames, path)
 
 
 def _is(cache, path: str) -> bool:

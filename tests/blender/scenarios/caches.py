@@ -207,6 +207,8 @@ def changed_since(folder: Path) -> None:
     """If the animation changes after hair was attached, or its bones were keyed, a note says so in each frame in which the head is
     elsewhere, also when the file is opened again, until the hair is baked anew; another one says which frames were not baked.
     """
+    from dcc_addon.session import session
+
     needs_usd()
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
@@ -259,6 +261,9 @@ def changed_since(folder: Path) -> None:
     assert told(10) == [both] and operators.bake_attach() == {"FINISHED"}
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))  # Revert
     assert told(10) == [both], "the file on disk is the bake that was taken back"
+    session.baked.clear()  # as if Blender had been closed meanwhile
+    bpy.context.scene.frame_set(24)
+    assert "its file was baked anew after this Blender file was saved, " in " ".join(drawn())
     assert operators.bake_attach() == operators.bake_keys() == {"FINISHED"} and told(10) == [neither]
     scene = bpy.context.scene
     scene.frame_end = 40
