@@ -13,7 +13,7 @@ from neuralocks_core import model
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.deformation.suited import nearest_to_all
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import as_path
+from neuralocks_core.files import as_path, check_writable
 from neuralocks_core.flags import flag
 from neuralocks_core.number_words import plain_number
 from neuralocks_core.progress import Progress
@@ -101,6 +101,7 @@ def train(
     except (RuntimeError, AssertionError):  # the latter if torch was built without CUDA
         raise NeuralocksError(f"--device {options.device}: this machine has no such device; use cpu") from None
     out = as_path(out, "out")
+    check_writable(out)
     history = {"spec": paper_boundary()} if paper else {}
     work = work_folder(out, resume)
     if begin == NOTHING and resume and (work / BEGINNING).exists():

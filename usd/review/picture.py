@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks preview`: a picture strip or a clip of a bake, of strands or of mesh hair."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -109,10 +109,7 @@ def _strands(baked: Baked, tell) -> tuple[drawing.Scene, Border]:
     scene, notes = baked.scene(), []
     every = (item.attachment.rig.path for item in baked.shot.grooms)
     drawn, *others = dict.fromkeys([baked.shown[0].attachment.rig.path, *every])
-    if others:
-        notes.append(
-            f"{drawn}: one of {1 + len(others)} characters is drawn; choose another, such as {others[0]}, with --skeleton PRIM"
-        )
+    notes += _undrawn(drawn, others)
     if scene.body is None and (body := baked.shown[0].attachment.character.body) is not None:
         notes.append(
             f"{drawn}: its body has {len(body.points)} points, more than {MOST_BODY_POINTS}, so only its hair is drawn"
@@ -136,4 +133,16 @@ def _scene(path, grooms, skeleton, head, tell) -> tuple[drawing.Scene, Border]:
         raise NeuralocksError(f"{path}: holds no groom and no hair chains; give a bake") from None
     except NeuralocksError as error:
         raise (no_strands if find_curves(open_stage(path), grooms) else error) from None
-    return rigged_scene(rigged), rigged.border
+    scene = rigged_scene(rigged)
+    if tell and (notes := _undrawn(rigged.path, rigged.others)):
+        tell(notes)
+    return scene, rigged.border
+
+
+def _undrawn(drawn: str, others: Sequence[str]) -> list[str]:
+    """The note on characters whose hair is not drawn."""
+    if not others:
+        return []
+    return [
+        f"{drawn}: one of {1 + len(others)} characters is drawn; choose another, such as {others[0]}, with --skeleton PRIM"
+    ]

@@ -109,7 +109,9 @@ def evaluate_rig(
     check_patterns(hair, chains)
     rig, source, say = hair.rig, hair.source, progress or silent
     if not len(rig.points):
-        raise NeuralocksError(f"{source.path}: no mesh is skinned to its hair joints; there is nothing to measure")
+        raise NeuralocksError(
+            f"{source.path}: no mesh that is shown is skinned to its hair joints; there is nothing to measure"
+        )
     if len(source.time_codes) < 2:
         raise NeuralocksError(f"{source.path}: is not animated; give a bake, or an animated character")
     moving = moving_joints(rig.character.skeleton, rig.chains)

@@ -23,7 +23,9 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
     source = rigged.source
     character, clip, body = source.character, source.clip, source.character.body
     if body is None:
-        raise NeuralocksError(f"{source.path}: it skins no mesh, so there is nothing to draw; bind the hair to it")
+        raise NeuralocksError(
+            f"{source.path}: it skins no mesh that is shown, so there is nothing to draw; show it, or bind the hair to it"
+        )
     skin = rigged.rig.character.body
     hair = np.ones(len(body.points), bool)
     if skin is not None:

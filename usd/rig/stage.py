@@ -69,7 +69,7 @@ def read_rigged_hair(path: str | Path, *, baked_first: bool = False, **options) 
     Args:
         path: USD file.
         baked_first: whether a bake is wanted: its hair is what it moves, and of several skeletons with hair chains, the first that a bake
-            moves is taken, or the first; otherwise several are refused.
+            moves and that skins a mesh that is shown is taken, or the first; otherwise several are refused.
         options: see `read_rigged_hairs`, also for what it raises.
 
     Raises:
@@ -77,7 +77,7 @@ def read_rigged_hair(path: str | Path, *, baked_first: bool = False, **options) 
     """
     found, _ = read_rigged_hairs(path, as_baked=baked_first, **options)
     if baked_first:
-        found.sort(key=lambda hair: not is_baked(hair.source))
+        found.sort(key=lambda hair: (not is_baked(hair.source), hair.source.character.body is None))
         found = [replace(found[0], others=tuple(hair.source.path for hair in found[1:]))]
     if len(found) > 1:
         few = ", ".join(hair.source.path for hair in found[:_FEW]) + (", ..." if len(found) > _FEW else "")

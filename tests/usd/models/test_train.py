@@ -230,6 +230,12 @@ def test_no_training_flies_across_the_cuts_of_a_capture(tmp_path):
     assert fastest < 0.1
 
 
+def test_what_cannot_be_written_is_told_before_training(tmp_path):
+    (tmp_path / "folder.neuralocks").mkdir()
+    with pytest.raises(NeuralocksError, match="folder.neuralocks: is a folder; give a file name"):
+        train(tmp_path / "nobody.usda", [], [], tmp_path / "folder.neuralocks", {})
+
+
 def test_a_second_moving_skeleton_is_told(tmp_path):
     path, notes = write_shot(tmp_path, Recipe(bound="mesh")), []
     stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))

@@ -221,7 +221,9 @@ def test_what_cannot_be_measured_is_one_line(tmp_path):
     stage = Usd.Stage.Open(str(shot))
     stage.RemovePrim("/Who/Hair")
     stage.GetRootLayer().Save()
-    with pytest.raises(NeuralocksError, match="/Who/Rig: no mesh is skinned to its hair joints; there is nothing"):
+    with pytest.raises(
+        NeuralocksError, match="/Who/Rig: no mesh that is shown is skinned to its hair joints; there is nothing"
+    ):
         evaluate_rig(shot)
 
 

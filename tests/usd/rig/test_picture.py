@@ -56,6 +56,12 @@ def test_of_several_characters_one_that_is_baked_is_drawn(tmp_path):
     assert read_rigged_hair(tmp_path / "two.usda", baked_first=True).source.path == "/A/Rig"
     with pytest.raises(NeuralocksError, match="2 skeletons have hair chains"):
         read_rigged_hair(baked)
+    both = bake_rig(tmp_path / "two.usda", tmp_path / "both.usda", model).path
+    assert read_rigged_hair(both, baked_first=True).source.path == "/A/Rig"
+    UsdGeom.Imageable(stage.GetPrimAtPath("/A")).MakeInvisible()  # its message was that no mesh is skinned
+    stage.Save()
+    drawn = read_rigged_hair(both, baked_first=True)
+    assert drawn.source.path == "/B/Rig" and drawn.others == ("/A/Rig",)
 
 
 def test_joints_without_a_mesh_have_no_picture(tmp_path):
