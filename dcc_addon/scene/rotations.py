@@ -2,6 +2,7 @@
 """Rotations of bones, stored as text while something else turns these bones, and restored exactly."""
 
 import json
+from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -42,7 +43,12 @@ def kept(armature, bones) -> str:
 
 def kept_in(text: str) -> dict[str, list]:
     """What `kept` stored, by bone; without values that it never writes."""
-    return remembered(text, _fits)
+    return dict(_read(text)) if isinstance(text, str) else {}
+
+
+@lru_cache(16)
+def _read(text: str) -> dict[str, list]:
+    return remembered(text, _fits)  # of hundreds of bones, and asked for in every frame
 
 
 def joined(newer: str, older: str) -> str:

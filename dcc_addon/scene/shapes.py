@@ -33,7 +33,7 @@ def shape(thing) -> list:
 
 
 def follows(mesh, others) -> bool:
-    """Whether drivers of a mesh's shape keys read one of these objects: its shape then changes with their pose, which is no edit."""
+    """Whether drivers of a mesh's shape keys read one of these: its shape then changes with them, which is no edit."""
     data = mesh.shape_keys.animation_data if mesh.shape_keys else None
     variables = [variable for curve in data.drivers for variable in curve.driver.variables] if data else []
     return any(target.id in others for variable in variables for target in variable.targets)
