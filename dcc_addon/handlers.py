@@ -80,7 +80,7 @@ def on_update(scene, graph):
         thing.original for thing in changed if isinstance(thing, bpy.types.Action) and thing.name_full not in switched
     ]
     if edited or keys:
-        _mark_stale([] if edited else users_of(keys))
+        _mark_stale(names, [] if edited else users_of(keys))
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
         session.wanting = session.wanting or bool(session.failed)
         session.failed.clear()
@@ -193,14 +193,16 @@ def _unseen(change):
         session.paused -= 1
 
 
-def _mark_stale(users: list[set]) -> None:
-    """Motions are out of date, of all rigs or of those that keys with these users may move."""
+def _mark_stale(names: set[str], users: list[set]) -> None:
+    """Motions are out of date, of all rigs or of those that keys with these users may move, and those are wanted of armatures of these
+    names that have none.
+    """
     found = [rig for rig in session.rigs.values() if not users or any(concerns(own, rig.moved_by) for own in users)]
     for sampled in found:
         sampled.stale = True
     session.edits += 1
     session.failed.clear()
-    session.wanting = session.wanting or bool(found) or not session.rigs
+    session.wanting = session.wanting or bool(found) or not names <= session.rigs.keys()
 
 
 def _catch_up() -> None:

@@ -6,7 +6,12 @@ def animated(data, without=()) -> set[str]:
     """Paths that actions, strips and drivers of some animation data write, except NLA tracks of the names `without`; none if there
     is no such data.
     """
-    return {curve.data_path for curve in _playing(data, without)}
+    return {path for path, _ in written(data, without)}
+
+
+def written(data, without=()) -> set[tuple[str, int]]:
+    """The same, each path with the numbers of it that are written; 0 if it has only one."""
+    return {(curve.data_path, curve.array_index) for curve in _playing(data, without)}
 
 
 def moved(data) -> set[str]:

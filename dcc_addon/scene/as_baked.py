@@ -21,6 +21,8 @@ MOST = 2000
 """Most frames of which is stored how the head stood."""
 NEAR = 1e-3
 """Turns [rad] and ways, in Blender's units, that are not told from none."""
+ROUNDED = 1e-6
+"""Far from the origin, ways of this share of the distance are not, either."""
 PIECES, PIECE = 256, 64
 """A file is known by so many pieces of so many bytes: a whole bake would take seconds to read, and no two are alike in all of these."""
 RETIMED = "the frame rate or Time Stretching was changed after the bake, so it plays the old motion; press {} again"
@@ -44,10 +46,10 @@ def remember(block, armature, scene, frames: tuple[int, int], path: str = "") ->
         "first": int(frames[0]),
         "last": int(frames[1]),
         "timing": _timing(scene),
-        "heads": stood[:, :3].ravel().tolist(),
+        "heads": stood[:, :3],
         "file": _print_of(path),
     }
-    block[KEY] = told
+    block[KEY] = told | {"heads": stood[:, :3].ravel().tolist()}
     return told
 
 
@@ -55,12 +57,13 @@ def changed(told, armature, scene, remedy: str, path: str = "") -> str:
     """What was changed since a bake, of which `told` was stored, perhaps in the file at `path`, and shows in this frame, with the remedy;
     empty if nothing is known to be.
     """
-    if not told or armature is None:
+    told = _checked(told)
+    if told is None or armature is None:
         return ""
     if _print_of(path) not in ("", told["file"]):
         return ANOTHER.format(remedy)
     first, last, frame = told["first"], told["last"], shown_frame(scene)
-    if not np.allclose(list(told["timing"]), _timing(scene), rtol=1e-6, atol=0):
+    if not np.allclose(told["timing"], _timing(scene), rtol=1e-6, atol=0):
         return RETIMED.format(remedy)
     if not first <= frame <= last:
         rendered = scene.frame_start <= frame <= scene.frame_end
@@ -72,16 +75,26 @@ def _moved(told, armature, scene, frame: float) -> bool:
     """Whether the head is drawn elsewhere than when the hair was baked; not if that is unknown: between frames, and where Blender does
     not pose the armature.
     """
-    bone, stood = armature.pose.bones.get(told["bone"]), np.array(told["heads"]).reshape(-1, 3, 4)
+    bone, stood = armature.pose.bones.get(told["bone"]), told["heads"]
     row = round(frame) - told["first"]
     if bone is None or row >= len(stood) or abs(frame - round(frame)) > NEAR:
         return False
     if layer_of(armature, scene) != bpy.context.view_layer:
         return False
     off, size = matrix(armature.matrix_world @ bone.matrix)[:3] - stood[row], np.abs(stood[row, :, :3]).max()
-    return bool(
-        np.abs(off[:, :3]).max() > NEAR * size or (np.abs(off[:, 3]) > NEAR * (1 + np.abs(stood[row, :, 3]))).any()
-    )
+    far = NEAR + ROUNDED * np.abs(stood[row, :, 3])
+    return bool(np.abs(off[:, :3]).max() > NEAR * size or (np.abs(off[:, 3]) > far).any())
+
+
+def _checked(told) -> dict | None:
+    """What `remember` stored, with arrays; None for anything else that a file may hold in its place."""
+    try:
+        found = {name: kind(told[name]) for name, kind in (("bone", str), ("first", int), ("last", int), ("file", str))}
+        found |= {name: np.array(told[name], float) for name in ("timing", "heads")}
+        found["heads"] = found["heads"].reshape(-1, 3, 4)
+    except (TypeError, ValueError, LookupError, OverflowError):
+        return None
+    return found if found["timing"].shape == (2,) else None
 
 
 def _print_of(path: str) -> str:

@@ -3,9 +3,11 @@
 
 import bpy
 
-ALOOF = {"ARMATURE", "CAMERA", "LIGHT", "LIGHT_PROBE", "SPEAKER"}
-"""Types of objects whose keys only move what is known to depend on them; meshes and empties may also be named by node groups, which are
-not followed.
+from ..session import session
+
+ALOOF = {"CAMERA", "LIGHT", "LIGHT_PROBE", "SPEAKER"}
+"""Types of objects whose keys only move what is known to depend on them, as do those of other characters. Meshes and empties may also be
+named by node groups, and rigs of controls read in roundabout ways, which are not followed.
 """
 
 
@@ -22,6 +24,6 @@ def users_of(actions) -> list[set]:
 
 
 def _elsewhere(user, moved_by: frozenset[str]) -> bool:
-    if isinstance(user, bpy.types.Object):
-        return user.type in ALOOF and user.name_full not in moved_by
-    return isinstance(user, (bpy.types.Camera, bpy.types.Light))
+    if not isinstance(user, bpy.types.Object) or user.name_full in moved_by:
+        return False
+    return user.type in ALOOF or user.name_full in session.rigs

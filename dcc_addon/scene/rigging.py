@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from .actions import HAIR, as_before
-from .animated import animated, strips_of
+from .animated import animated, strips_of, written
 from .settings import as_set, objects_named, settings_of
 from .shapes import shape
 from .unkeyed import PLACE, value_of
@@ -21,7 +21,7 @@ LIMITED = tuple(f"{what}_{axis}" for what in ("use_ik_limit", "lock_ik") for axi
 """Settings of bones that posing does not change."""
 DELTA = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
 """What adds to an object's own channels, PLACE."""
-_ONE = re.compile(r"(\[\d+\]|\.[wxyz])$")
+_ONE = re.compile(r"(?:\[(\d+)\]|\.[wxyz])$")
 """How the path of one number of several ends; curves name all of them, and the number beside."""
 
 
@@ -53,7 +53,7 @@ def reached(things) -> list:
         if thing.type != "CURVES":
             others += [other for modifier in thing.modifiers for other in objects_named(modifier)]
         for constraint in [*thing.constraints, *(c for bone in bones for c in bone.constraints)]:
-            others += [getattr(constraint, name, None) for name in ("target", "pole_target")]
+            others += objects_named(constraint)
             others += [target.target for target in getattr(constraint, "targets", ())]
         for data in _animation(thing):
             drivers = [curve.driver for curve in data.drivers]
@@ -132,7 +132,7 @@ def _lists(owner, start: str, moving: set[str]) -> list:
 
 def _read(data) -> list:
     """What drivers read, and no animation writes, of anything but objects' places."""
-    found, written = [], {}  # hundreds of drivers may read one rig
+    found, known = [], {}  # hundreds of drivers may read one rig
     variables = [variable for curve in data.drivers for variable in curve.driver.variables]
     for variable, target in [(each, target) for each in variables for target in each.targets]:
         path, owner = target.data_path, target.id
@@ -141,11 +141,19 @@ def _read(data) -> list:
         # What the frame is belongs to each frame, as in drivers that name it without a variable.
         if not path or owner is None or isinstance(owner, bpy.types.Scene) and path.startswith("frame_"):
             continue
-        if owner not in written:
-            written[owner] = animated(getattr(owner, "animation_data", None))
-        if not {path, _ONE.sub("", path)} & written[owner]:
+        if owner not in known:
+            known[owner] = written(getattr(owner, "animation_data", None))
+        if not _written(path, known[owner]):
             found.append(value_of(owner, path))
     return found
+
+
+def _written(path: str, known: set[tuple[str, int]]) -> bool:
+    """Whether animation writes what is at a path, which may be one number of several."""
+    one = _ONE.search(path)
+    if one and one[1]:
+        return (path[: one.start()], int(one[1])) in known or (path, 0) in known
+    return any(each in (path, path[: one.start()] if one else path) for each, _ in known)
 
 
 def _channels(bones, names: dict[str, int]) -> list[int]:

@@ -33,10 +33,13 @@ def shape(thing) -> list:
 
 
 def follows(mesh, others) -> bool:
-    """Whether drivers of a mesh's shape keys read one of these: its shape then changes with them, which is no edit."""
+    """Whether drivers of a mesh's shape keys read one of these data blocks, without those that its own edits change, too: the mesh then
+    takes another shape with them, which is no edit.
+    """
     data = mesh.shape_keys.animation_data if mesh.shape_keys else None
     variables = [variable for curve in data.drivers for variable in curve.driver.variables] if data else []
-    return any(target.id in others for variable in variables for target in variable.targets)
+    read = {target.id for variable in variables for target in variable.targets if target.id in others}
+    return any(each not in (mesh, mesh.shape_keys) and getattr(each, "data", None) != mesh for each in read)
 
 
 def _curve(curve) -> list:

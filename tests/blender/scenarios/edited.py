@@ -251,10 +251,29 @@ def read_by_number(_folder: Path) -> None:
         bpy.context.view_layer.update()
         notice(rig, scene)
         assert not session.rigs["Rig"].stale, frame
+    driver = correction.driver_add("slider_max").driver  # which reads its own mesh
+    driver.expression, variable = "v", driver.variables.new()
+    variable.name, variable.targets[0].id, variable.targets[0].data_path = "v", skin, '["Fat"]'
+    skin["Fat"] = 1.0
+    bpy.context.view_layer.update()
+    session.rigs["Rig"].stale = False
     skin.data.vertices[0].co.x += 0.01
     skin.data.update()
     bpy.context.view_layer.update()
     assert session.rigs["Rig"].stale
+    rig.pose.bones["chest"]["sways"] = [0.0, 0.0]
+    for frame in (1, 20):
+        rig.pose.bones["chest"]["sways"][1] = 0.1 * frame
+        rig.keyframe_insert('pose.bones["chest"]["sways"]', index=1, frame=frame)
+    driver = rig.pose.bones["chest"].driver_add("rotation_euler", 2).driver
+    driver.expression, variable = "v", driver.variables.new()
+    variable.name, variable.targets[0].id = "v", rig
+    variable.targets[0].data_path = 'pose.bones["chest"]["sways"][0]'
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    for turned in (False, True):
+        rig.pose.bones["chest"]["sways"][0] = 0.5 * turned
+        notice(rig, scene)
+        assert session.rigs["Rig"].stale == turned, "the number beside is keyed, and this one is not"
 
 
 def keyed_elsewhere(_folder: Path) -> None:
@@ -270,25 +289,25 @@ def keyed_elsewhere(_folder: Path) -> None:
     for thing in (camera, empty):
         scene.collection.objects.link(thing)
 
-    def told(owner, path: str) -> list[bool]:
+    def told(owner, path: str, value: float = 1.0) -> list[bool]:
         for rig in rigs:
             session.rigs[rig.name].stale = False
-        for frame, value in ((3, 1.0), (9, 2.0)):
-            setattr(owner, path, (value, 0.0, 0.0) if path == "location" else value)
+        for frame in (3, 9):
+            setattr(owner, path, (value * frame, 0.0, 0.0) if path == "location" else value * frame)
             owner.keyframe_insert(path, frame=frame)
         bpy.context.view_layer.update()
         return [session.rigs[rig.name].stale for rig in rigs]
 
     neither, both = [False, False], [True, True]
-    assert told(camera, "location") == told(camera.data, "lens") == neither
+    assert told(camera, "location") == neither
     assert told(rigs[0], "location") == [True, False] and told(rigs[1], "location") == [False, True]
     assert told(empty, "location") == both, "what node groups name is not known"
-    rigs[0].constraints.new("COPY_LOCATION").target = camera
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    rigs[0].constraints.new("OBJECT_SOLVER").camera = camera
     for rig in rigs:
         scene.neuralocks.armature = rig
         assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    assert told(camera, "location") == [True, False]
+    assert told(camera, "location", 2.0) == [True, False]
+    assert told(camera.data, "lens") == both, "what else reads a lens is not known"
 
 
 def hidden_prop(folder: Path) -> None:
