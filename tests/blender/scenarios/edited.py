@@ -3,6 +3,7 @@
 
 import math
 from pathlib import Path
+from unittest import mock
 
 import bpy
 import numpy as np
@@ -278,6 +279,7 @@ def read_by_number(_folder: Path) -> None:
 
 def keyed_elsewhere(_folder: Path) -> None:
     """Keys of a camera, a lamp or another character leave a motion as it is; those of what moves it, or may move it, do not."""
+    from dcc_addon import background
     from dcc_addon.session import session
 
     scene, rigs = bpy.context.scene, [scenes.armature(), scenes.armature()]
@@ -300,6 +302,12 @@ def keyed_elsewhere(_folder: Path) -> None:
 
     neither, both = [False, False], [True, True]
     assert told(camera, "location") == neither
+    sampled = session.rigs.pop(rigs[1].name)
+    with mock.patch.object(background, "request") as asked:
+        camera.keyframe_insert("location", frame=20)
+        bpy.context.view_layer.update()
+    assert asked.called, "a motion that is missing is wanted, whatever was keyed"
+    session.rigs[rigs[1].name] = sampled
     assert told(rigs[0], "location") == [True, False] and told(rigs[1], "location") == [False, True]
     assert told(empty, "location") == both, "what node groups name is not known"
     rigs[0].constraints.new("OBJECT_SOLVER").camera = camera
