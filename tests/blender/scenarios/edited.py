@@ -3,7 +3,7 @@
 
 import math
 from pathlib import Path
-from unittest import mock
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -303,7 +303,7 @@ def keyed_elsewhere(_folder: Path) -> None:
     neither, both = [False, False], [True, True]
     assert told(camera, "location") == neither
     sampled = session.rigs.pop(rigs[1].name)
-    with mock.patch.object(background, "request") as asked:
+    with patch.object(background, "request") as asked:
         camera.keyframe_insert("location", frame=20)
         bpy.context.view_layer.update()
     assert asked.called, "a motion that is missing is wanted, whatever was keyed"
