@@ -98,7 +98,7 @@ def write_grooms(path, grooms: list[Authored], rig: StageRig | None = None, over
     """
 
     border = rig.border if rig else None
-    place = np.eye(4) if rig is None else rig.source.bind_shown @ np.linalg.inv(rig.to_bind)
+    place = np.eye(4) if rig is None else rig.bind_shown @ np.linalg.inv(rig.to_bind)
 
     def author(stage: Usd.Stage) -> None:
         UsdGeom.SetStageUpAxis(stage, border.up_axis if border else UsdGeom.Tokens.y)

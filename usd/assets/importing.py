@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks import`: hair files of other tools as USD grooms, as they are or put on a character's head."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +33,7 @@ from ..shot.other_curves import of_other_kinds
 from ..shot.rig_controls import open_curves
 from ..shot.seat_notes import REVERSED
 from ..shot.stage import read_rigs, read_shot
+from ..skel.bind_world import bind_shown
 from ..skel.binding import bound_skeleton, geom_bind
 from ..skel.joints import JointSource
 from ..skel.source import find_skeletons
@@ -181,17 +183,21 @@ def _primvars(look: Look) -> tuple[Primvar, ...]:
     return tuple(found)
 
 
-def _place(prim: Usd.Prim) -> np.ndarray:
-    """Where the stage shows curves at rest, (4, 4): of those bound to a skeleton, skinning ignores the prim's own transform."""
-    skeleton = bound_skeleton(prim)
-    if skeleton is None:
-        return Placement(prim).reference
-    skeleton = prim.GetStage().GetPrimAtPath(skeleton)
-    try:
-        shown = JointSource(skeleton).bind_shown
-    except NeuralocksError:  # whatever is wrong with it, its curves are imported
-        shown = Placement(skeleton).reference
-    return shown @ geom_bind(prim)
+def _places(curves: list[Usd.Prim]) -> Iterator[np.ndarray]:
+    """Where the stage shows curves at rest, each (4, 4): of those bound to a skeleton, skinning ignores the prim's own transform."""
+    known: dict[str, np.ndarray] = {}  # hundreds of prims may be bound to one
+    for prim in curves:
+        path = bound_skeleton(prim)
+        if path is None:
+            yield Placement(prim).reference
+            continue
+        if path not in known:
+            skeleton = prim.GetStage().GetPrimAtPath(path)
+            try:
+                known[path] = bind_shown(JointSource(skeleton))
+            except NeuralocksError:  # whatever is wrong with it, its curves are imported
+                known[path] = Placement(skeleton).reference
+        yield known[path] @ geom_bind(prim)
 
 
 @names_damage
@@ -213,9 +219,10 @@ def _read_usd(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Auth
         ]
     )
     notes += few([no_points(str(prim.GetPath())) for prim in empty]) + of_other_kinds(stage)
-    for prim in (prim for prim in hair if prim not in empty):
+    filled = [prim for prim in hair if prim not in empty]
+    for prim, place in zip(filled, _places(filled), strict=True):
         curves = UsdGeom.BasisCurves(prim)
-        groom = read_groom(prim, border.to_core @ _place(prim), notes)
+        groom = read_groom(prim, border.to_core @ place, notes)
         notes += [] if sized else groom_notes(prim, groom, border)
         if widths_attribute(curves).ValueMightBeTimeVarying():
             notes.append(f"{prim.GetPath()}: its widths change over time; the first ones are imported")

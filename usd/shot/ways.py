@@ -46,7 +46,7 @@ def ways(
     still = []
     if mesh is not None and mesh.placement.usable:
         still.append(rig.to_bind @ mesh.geom_bind @ np.linalg.inv(mesh.placement.reference) @ groom)
-    still += [rig.to_bind @ np.linalg.inv(rig.source.bind_shown) @ groom, rig.to_bind @ groom]
+    still += [rig.to_bind @ np.linalg.inv(rig.bind_shown) @ groom, rig.to_bind @ groom]
     if placement.brought is not None:  # another file's groom knows nothing of where the character's file puts it
         still.append(rig.border.to_core @ groom)
     if not rig.source.animated:

@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bind pose in the world: which way is up in it, and how large it is."""
+"""The bind pose in the world: which way is up in it, how large it is, and where it is shown."""
 
 import numpy as np
+from pxr import UsdGeom
 
 from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.anatomy.standing import standing
 from neuralocks_core.character import sizes_shown
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import sizes
+from neuralocks_core.rotation import inverses, sizes
 
+from ..border.placement import Placement
 from ..border.units import Border
 from .joints import JointSource
 
+ALIKE = 1e-4
+"""Places that are no farther apart are one; see `_apart`."""
 LEAST = 1e-6
 """Less than this times the size in the bind pose counts as no size."""
 
@@ -55,6 +59,29 @@ def to_bind_world(source: JointSource, border: Border, posed: np.ndarray, humano
     result = np.eye(4)
     result[:3, :3] = standing(placed, source.bind[:, :3, 3], humanoid, up) * ratio
     return border.to_core @ result
+
+
+def bind_shown(source: JointSource) -> np.ndarray:
+    """Where USD shows at rest what lies in the authored bind space, (4, 4): bind transforms may be in the skeleton's own space, or in the
+    world's as USD means them, which differ where its prim is moved. If the rest pose shows them neither there nor where a prim above, as
+    a reference to a whole file, puts that world, it is another pose, and they are taken as the skeleton's own.
+    """
+    own, above, bind = source.placement.reference, source.prim.GetParent(), source.bind
+    solid = np.abs(np.linalg.det(bind[:, :3, :3])) > np.finfo(float).tiny
+    shown, reach = source.at_rest[solid] @ inverses(bind[solid]), 1 + np.abs(bind[:, :3, 3]).max()
+    if not len(shown) or _apart(shown, shown[0], reach).max() > ALIKE or _apart(own, shown[0], reach) <= ALIKE:
+        return own
+    worlds = [np.eye(4)]
+    while above.IsA(UsdGeom.Xformable):
+        worlds.append(Placement(above).reference)
+        above = above.GetParent()
+    return shown[0] if _apart(np.array(worlds), shown[0], reach).min() <= ALIKE else own
+
+
+def _apart(places: np.ndarray, place: np.ndarray, reach: float) -> np.ndarray:
+    """How far places (..., 4, 4) are from one of them, in turn and size and as a share of the skeleton's reach, (...)."""
+    off = np.abs(places - place)[..., :3, :] / [1, 1, 1, reach]
+    return off.max(axis=(-2, -1)) / np.abs(place[:3, :3]).max()
 
 
 def _mirrors(transform: np.ndarray) -> bool:

@@ -11,7 +11,7 @@ from pxr import Sdf, Usd, UsdSkel, Vt
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import from_parents, from_quaternion, inverses, relative_to_parents
+from neuralocks_core.rotation import from_parents, from_quaternion, relative_to_parents
 
 from ..border.arrays import wxyz
 from ..border.placement import Placement
@@ -19,8 +19,6 @@ from ..border.values import as_names, as_numbers
 from .keys import Keys
 from .rig_copy import hair_of, source_of
 
-ALIKE = 1e-4
-"""Places that differ by this much, in turn and size and as a share of the skeleton's reach, are one."""
 STRETCH = 0.003
 """A quaternion's length may be off by this much without a note: single and half precision are nearer."""
 
@@ -107,22 +105,6 @@ class JointSource:
     def at_rest(self) -> np.ndarray:
         """Joints (J, 4, 4) in stage world space in the rest pose, which UsdSkel shows without an animation."""
         return self.placement.reference @ from_parents(self.rest, self.parents)
-
-    @cached_property
-    def bind_shown(self) -> np.ndarray:
-        """Where USD shows at rest what lies in the authored bind space, (4, 4): bind transforms may be in the skeleton's own space, or in
-        the world's as USD means them, which differ where something moves the skeleton's prim. If the rest pose is another than the
-        bind pose, it does not say which, and they are taken as the skeleton's own.
-        """
-        own = self.placement.reference
-        solid = np.abs(np.linalg.det(self.bind[:, :3, :3])) > np.finfo(float).tiny
-        shown = self.at_rest[solid] @ inverses(self.bind[solid])
-        if not len(shown):
-            return own
-        ways, reach = np.concatenate([[own], shown]), np.abs(self.bind[:, :3, 3]).max()
-        off = np.abs(ways - shown[0])[:, :3] / [1, 1, 1, 1 + reach]
-        off = off.max(axis=(1, 2)) / np.abs(shown[0, :3, :3]).max()
-        return shown[0] if off[0] > ALIKE >= off[1:].max() else own
 
     @property
     def channels(self) -> tuple[Usd.Attribute, ...]:

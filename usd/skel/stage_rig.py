@@ -16,6 +16,7 @@ from neuralocks_core.motion import LOOP_GAP, Clip
 from neuralocks_core.rotation import angle_between, flat, polar
 
 from ..border.units import Border
+from .bind_world import bind_shown
 from .blend_shapes import all_shares
 from .joints import JointSource
 from .motion_sketch import motion_sketch
@@ -73,6 +74,11 @@ class StageRig:
         if "head" not in self.character.humanoid:
             return np.eye(4)
         return self.character.carrying(self._to_world @ self.source.at_rest @ self._trim)
+
+    @cached_property
+    def bind_shown(self) -> np.ndarray:
+        """See `bind_world.bind_shown`."""
+        return bind_shown(self.source)
 
     def joints_at(self, time_code: float) -> np.ndarray:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""

@@ -13,7 +13,7 @@ from neuralocks_core.errors import NeuralocksError
 from usd.shot.stage import read_shot
 from usd.skel.bind_world import to_bind_world
 
-from ..shots import JOINTS, POSITIONS, Recipe, write_shot
+from ..shots import JOINTS, POSITIONS, Recipe, edited, write_shot
 
 STANDING = {"hips": (0, 1, 0), "head": (0, 1.7, 0.05), "left_foot": (0.1, 0.1, 0), "right_foot": (-0.1, 0.1, 0)}
 GRAZING = {"hips": (0, 1.2, -1), "head": (0, 1.0, 1)}
@@ -97,3 +97,21 @@ def test_a_head_that_a_scale_of_zero_hides_all_the_while_is_told_with_the_joint(
     stage.Save()
     with pytest.raises(NeuralocksError, match=f"^/Hero/Rig: joint '{joint}' is scaled to 0 x 0 x 1 .*leave it at 1"):
         read_shot(path)
+
+
+@pytest.mark.parametrize("aside", [(3, 0, 0), (0, 0.05, 0)])
+def test_a_rest_pose_that_stands_elsewhere_takes_no_hair_along(aside, tmp_path):
+    """It says nothing about the space of bind transforms, as one does that shows them in the world where they are."""
+
+    def moved(stage):
+        skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Hero/Rig"))
+        rest = skeleton.GetRestTransformsAttr().Get()
+        rest[0] = rest[0] * Gf.Matrix4d().SetTranslate(aside)
+        skeleton.GetRestTransformsAttr().Set(rest)
+
+    recipe = Recipe(bound="none")
+    grooms = [
+        read_shot(path).grooms[0].groom
+        for path in (write_shot(tmp_path, recipe), edited(tmp_path / "other", moved, recipe))
+    ]
+    np.testing.assert_allclose(grooms[1].points, grooms[0].points, atol=1e-6)
