@@ -118,6 +118,8 @@ class Session:
     models: dict[str, tuple[tuple, StrandModel]] = field(default_factory=dict)
     weights: dict[str, tuple[tuple, np.ndarray]] = field(default_factory=dict)
     """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
+    vertices: dict[str, int] = field(default_factory=dict)
+    """A number of the vertices of each body mesh as they were read last, by mesh name."""
     messages: dict[str, str] = field(default_factory=dict)
     misrendered: dict[str, str] = field(default_factory=dict)
     """What the last render showed wrongly, by armature name, until the next one begins."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The body mesh at rest: surface, vertex groups and shape keys."""
 
+import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -45,6 +46,7 @@ def read(mesh_object, armature) -> BodyArrays:
             f"{mesh_object.name_full}: it has no faces to keep hair out of; choose a body with a surface, or none"
         )
     points = vertices(mesh).astype(float)
+    session.vertices[mesh.name_full] = number_of(mesh)
     triangles = _triangles(mesh)
     groups = tuple(group.name for group in mesh_object.vertex_groups)
     weights, shapes, keys = _weights(mesh, groups), {}, mesh.shape_keys
@@ -177,6 +179,11 @@ def _triangles(mesh) -> np.ndarray:
     kept.data.foreach_get("value", vertex_of)
     mesh.loop_triangles.foreach_get("loops", triangles.ravel())
     return vertex_of[triangles]
+
+
+def number_of(mesh) -> int:
+    """A number that changes when vertices of a mesh do."""
+    return zlib.crc32(vertices(mesh))
 
 
 def vertices(mesh) -> np.ndarray:

@@ -3,8 +3,9 @@
 
 import zlib
 
+from ..session import session
 from .animated import animated
-from .body import coordinates, vertices
+from .body import coordinates, number_of
 from .settings import as_set, settings_of
 
 CURVE = (
@@ -26,20 +27,22 @@ def shape(thing) -> list:
     if thing.type == "CURVE":
         return _curve(thing.data)
     if thing.type == "MESH":
-        return [zlib.crc32(vertices(thing.data)), *_keys(thing.data.shape_keys)]
+        return [number_of(thing.data), *_keys(thing.data.shape_keys)]
     if thing.type == "LATTICE":
         return [[point.co_deform[:] for point in thing.data.points], *_keys(thing.data.shape_keys)]
     return []
 
 
 def follows(mesh, others) -> bool:
-    """Whether drivers of a mesh's shape keys read one of these data blocks, without those that its own edits change, too: the mesh then
-    takes another shape with them, which is no edit.
+    """Whether a body mesh only takes another shape with these data blocks, which drivers of its shape keys read; an edit of it may change
+    some of them, too.
     """
     data = mesh.shape_keys.animation_data if mesh.shape_keys else None
     variables = [variable for curve in data.drivers for variable in curve.driver.variables] if data else []
     read = {target.id for variable in variables for target in variable.targets if target.id in others}
-    return any(each not in (mesh, mesh.shape_keys) and getattr(each, "data", None) != mesh for each in read)
+    if all(each in (mesh, mesh.shape_keys) or getattr(each, "data", None) == mesh for each in read):
+        return False
+    return session.vertices.get(mesh.name_full) == number_of(mesh)
 
 
 def _curve(curve) -> list:

@@ -252,6 +252,12 @@ def read_by_number(_folder: Path) -> None:
         bpy.context.view_layer.update()
         notice(rig, scene)
         assert not session.rigs["Rig"].stale, frame
+    skin.data.vertices[0].co.x += 0.01
+    skin.data.update()
+    rig.update_tag()  # as where meshes are joined
+    bpy.context.view_layer.update()
+    assert session.rigs["Rig"].stale
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     driver = correction.driver_add("slider_max").driver  # which reads its own mesh
     driver.expression, variable = "v", driver.variables.new()
     variable.name, variable.targets[0].id, variable.targets[0].data_path = "v", skin, '["Fat"]'
