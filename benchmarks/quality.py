@@ -173,7 +173,9 @@ def main() -> None:
     if arguments.motion:
         from usd.models.clip_file import read_clip
 
-        clips = {path.rsplit("/", 1)[-1]: read_clip(path, bench.character) for path in arguments.motion}
+        parts = {path.rsplit("/", 1)[-1]: read_clip(path, bench.character).parts for path in arguments.motion}
+        # The solver would fly across a cut.
+        clips = {name: max(own, key=lambda part: part.end - part.start) for name, own in parts.items()}
     else:
         clips = {kind: scripted_clip(bench.character, kind) for kind in arguments.kind or KINDS}
     rows = []

@@ -26,6 +26,9 @@ from .movers import Movers
 from .posing import GroomPoser
 from .procedure import BakeResult, known_notes, read_asked, write_told
 
+RECORDED = 12
+"""Letters of a model's digest that a bake records."""
+
 
 def bake(
     shot,
@@ -92,7 +95,7 @@ def bake(
     shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
     models = movers.each(shot.grooms)
-    digests = {item.path: _digest(each) for each, items in models for item in items}
+    digests = {item.path: digest_of(each) for each, items in models for item in items}
     inputs = {"models": digests, "material": asdict(look), "wind": blown and asdict(blown)}
 
     def poser(items: list[StageGroom]) -> GroomPoser:
@@ -102,7 +105,7 @@ def bake(
     alike |= wind_facts(blown) | given_facts(cuts, joints)
 
     def facts(item: StageGroom) -> dict:
-        return {"model": digests[item.path][:12], **alike}
+        return {"model": digests[item.path][:RECORDED], **alike}
 
     moved = [(each, [item.attachment for item in items]) for each, items in models]
     untrue = {note for each in moved for note in learned(*each)}
@@ -132,7 +135,8 @@ def as_material(material) -> Material:
     return Material.parse(words)
 
 
-def _digest(model: StrandModel) -> str:
+def digest_of(model: StrandModel) -> str:
+    """A number of a model's card and graphs, of which a bake records the first RECORDED letters."""
     digest = hashlib.sha256(repr(sorted(model.file.meta.items(), key=str)).encode())
     for name in model_file.KINDS["strands"]:
         digest.update(model.file.graphs[name])

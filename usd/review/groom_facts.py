@@ -14,6 +14,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
 
+from ..baking.bake import RECORDED, digest_of
 from ..baking.model_notes import model_notes
 from ..border.placement import Placement
 from ..border.units import Border
@@ -84,13 +85,15 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
     groom, beyond = groom_between(prim, to_bind, spoils, drawn=drawn)
     if beyond is not None:
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
+    made = recorded(prim)
     if joint:
         mover = suited(None, found.character, groom)
         joint["shipped model"] = mover.stem
-        spoils += groom_notes(prim, groom, border) + model_notes(_loaded(mover), Material(), [found])
+        spoils += groom_notes(prim, groom, border)
+        if not made or made.get("model") == digest_of(_loaded(mover))[:RECORDED]:
+            spoils += model_notes(_loaded(mover), Material(), [found])
     if found:
         spoils += baked_from_others(prim, found, groom)
-    made = recorded(prim)
     baked = {"samples": _samples(prim, border), "baked with": made} if made else {}
     spoils += retimed(prim) + _unfit(prim) if made else []
     return facts | joint | groom_facts(groom) | baked

@@ -60,11 +60,13 @@ def test_a_model_of_another_body_is_told(model, shot):
     assert "upper arm half distance" in note
 
 
-def test_inspect_tells_what_a_bake_does(tmp_path):
+def test_inspect_tells_what_a_bake_does(tmp_path, model):
     """It promised what would spoil a bake, and the bake then said more."""
     path = write_shot(tmp_path)
     (note,) = [note for note in bake(path, tmp_path / "hair.usda", frames="1:1").notes if "another body" in note]
-    assert note in inspect(path)["spoils"]
+    assert note in inspect(path)["spoils"] and note in inspect(tmp_path / "hair.usda")["spoils"]
+    bake(path, tmp_path / "mine.usda", model, frames="1:1")
+    assert note not in inspect(tmp_path / "mine.usda")["spoils"], "its own model moved it"
 
 
 def test_a_character_that_the_model_was_trained_on_is_none_that_no_model_knows(model, tmp_path, monkeypatch):
