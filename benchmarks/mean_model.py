@@ -8,8 +8,9 @@ SHARE is the share of BEGUN, from 0 to 1. Both share their strand codes, which s
 take so many times the damping for what it is told: a model that learned from a solver whose steps damp, before it is mixed
 with one that did not. The card is that of BEGUN and says so, without the measurements of BEGUN. With `--without`, the card
 does not tell of the hair of some grooms, by their numbers in the training of BEGUN, from 0 on: for those that another shipped
-model moves better, so that hair like it does not get this one (`deformation/suited.py`). With `--also`, it tells of the hair of some
-grooms in the card of another model, too, which this one moves as well: hair that it began with, or in place of that model.
+model moves better, so that hair like it does not get this one (`deformation/suited.py`); without all of it, the model is for
+hair that is like none. With `--also`, it tells of the hair of some grooms in the card of another model, too, which this one
+moves as well: hair that it began with, or in place of that model.
 """
 
 from __future__ import annotations
@@ -73,8 +74,9 @@ def mean(
         for other, *chosen in also:
             rows = _grooms(model_file.read(Path(other), "strands").meta["training"])
             told += [rows[int(i)] for i in chosen]
-        each = KEPT // len(told)
-        training["hair"] = [rows[i] for rows in told for i in spread(len(rows), each)]
+        training["hair"] = [rows[i] for rows in told for i in spread(len(rows), KEPT // len(told))]
+        if not told:
+            del training["hair"]
     graphs = strand_graphs(Beginning(begun).coder(), first, meta["output"])
     return model_file.write(out, {**meta, "training": training, "report": {}}, graphs)
 
