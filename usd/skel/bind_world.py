@@ -72,8 +72,8 @@ def bind_shown(source: JointSource) -> np.ndarray:
     if not len(shown) or _apart(shown, shown[0], reach).max() > ALIKE or _apart(own, shown[0], reach) <= ALIKE:
         return own
     worlds = [np.eye(4)]
-    while above.IsA(UsdGeom.Xformable):
-        worlds.append(Placement(above).reference)
+    while not above.IsPseudoRoot():
+        worlds += [Placement(above).reference] if above.IsA(UsdGeom.Xformable) else []
         above = above.GetParent()
     return shown[0] if _apart(np.array(worlds), shown[0], reach).min() <= ALIKE else own
 
