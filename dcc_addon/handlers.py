@@ -73,12 +73,9 @@ def on_update(scene, graph):
         return
     meshes = {u.id.name_full for u in graph.updates if isinstance(u.id, bpy.types.Mesh) and u.is_updated_geometry}
     bodies = [body.data for a in live.carriers(scene) for body in bodies_of(a, scene)] if meshes else ()
-    edited = any(
-        mesh.name_full in meshes and not follows(mesh, [thing.original for thing in changed]) for mesh in bodies
-    )
-    keys = [
-        thing.original for thing in changed if isinstance(thing, bpy.types.Action) and thing.name_full not in switched
-    ]
+    own = [thing.original for thing in changed]
+    edited = any(mesh.name_full in meshes and not follows(mesh, own) for mesh in bodies)
+    keys = [thing for thing in own if isinstance(thing, bpy.types.Action) and thing.name_full not in switched]
     if edited or keys:
         _mark_stale(names, [] if edited else users_of(keys))
     if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):

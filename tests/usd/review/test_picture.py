@@ -41,6 +41,24 @@ def test_it_tells_whose_hair_is_not_drawn(tmp_path, monkeypatch):
     assert told == ["/Bert/Rig: its body has 416 points, more than 100, so only its hair is drawn"]
 
 
+def test_a_hidden_character_is_not_said_to_be_drawn(tmp_path, monkeypatch):
+    """The note named it, and as another choice the one that was drawn."""
+    monkeypatch.setattr(picture.drawing, "render", lambda scene, path, **_: path)
+    hero, told = write_shot(tmp_path, Recipe(bound="own", strands=4)), []
+    stage = Usd.Stage.CreateNew(str(tmp_path / "both.usda"))
+    for name, x in (("Anna", -1.0), ("Bert", 1.0)):
+        prim = stage.DefinePrim(f"/{name}")
+        prim.GetReferences().AddReference(str(hero), "/Hero")
+        UsdGeom.XformCommonAPI(prim).SetTranslate((x, 0, 0))
+    UsdGeom.Imageable(stage.GetPrimAtPath("/Anna")).MakeInvisible()
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    stage.SetTimeCodesPerSecond(24)
+    stage.Save()
+    bake(tmp_path / "both.usda", tmp_path / "hair.usda", frames="1:2")
+    picture.preview(tmp_path / "hair.usda", "hair.png", tell=told.extend)
+    assert told == ["/Bert/Rig: one of 2 characters is drawn; choose another, such as /Anna/Rig, with --skeleton PRIM"]
+
+
 @pytest.fixture(scope="module")
 def hair(tmp_path_factory):
     """A bake of frames 5 to 12, with motion blur."""
