@@ -9,8 +9,8 @@ from .kept import Bound
 from .models import model_path, stamp
 from .pose import pose
 from .scene import rotations
+from .scene.clock import shown_frame
 from .scene.lively import lively
-from .scene.shown import shown_frame
 from .services.bones import LiveBones
 from .session import session
 from .unsampled import unsampled

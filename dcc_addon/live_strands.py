@@ -18,6 +18,7 @@ from .kept import Prepared
 from .models import load_model, model_path, named_model, stamp
 from .pose import pose
 from .scene import curves
+from .scene.clock import shown_frame
 from .scene.layers import graph_of, layer_of
 from .scene.lively import lively
 from .scene.lookup import find, identity, in_scene
@@ -25,7 +26,6 @@ from .scene.muting import mute_deformers, unmute_deformers
 from .scene.paths import check_found
 from .scene.placing import world
 from .scene.riding import on_hair_bone
-from .scene.shown import shown_frame
 from .scene.watched import evaluated_for_itself
 from .scene.windows import drawing, layer_shown
 from .services import rig as rig_service

@@ -7,9 +7,9 @@ from neuralocks_core.errors import NeuralocksError
 
 from .scene.actions import as_before
 from .scene.binding import hidden
+from .scene.clock import shown_frame
 from .scene.last_called import others_called
 from .scene.sampled_from import timing_of
-from .scene.shown import shown_frame
 from .services.axes import to_core
 from .services.motion import as_carried, same_pose
 from .session import session

@@ -15,6 +15,7 @@ from ..live_rig import bind, rest, show_rest
 from ..models import model_path
 from ..scene import actions, as_baked
 from ..scene.attach import check_own
+from ..scene.clock import stretch_of
 from ..scene.export import write_shot
 from ..scene.lookup import named
 from ..scene.paths import absolute
@@ -77,7 +78,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         every = sampled.motion.frames
         own = own_turns(sampled.own, sampled.motion, bones.joints, every)
         # Blender evaluates animation at stretched time.
-        stretch = scene.render.frame_map_old / scene.render.frame_map_new
+        stretch = 1 / stretch_of(scene)
         settings.rig_live = False
         rest(armature)
         action = actions.bake_keys(armature, bones.bones, (stretch * frames, turns), (stretch * every, own))

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..session import session
 from .armature import matrix
+from .clock import rate_of, shown_frame, stretch_of
 from .layers import layer_of
-from .shown import shown_frame
 
 KEY = "neuralocks_baked"
 """The property of a cache file, or of an action with hair keys, that stores it."""
@@ -45,7 +45,7 @@ def remember(block, armature, scene, frames: tuple[int, int], path: str = "") ->
         "bone": sampled.rig.bones[head],
         "first": int(frames[0]),
         "last": int(frames[1]),
-        "timing": _timing(scene),
+        "timing": [rate_of(scene), stretch_of(scene)],
         "heads": stood[:, :3],
         "file": _print_of(path),
     }
@@ -63,7 +63,7 @@ def changed(told, armature, scene, remedy: str, path: str = "") -> str:
     if _print_of(path) not in ("", told["file"]):
         return ANOTHER.format(remedy)
     first, last, frame = told["first"], told["last"], shown_frame(scene)
-    if not np.allclose(told["timing"], _timing(scene), rtol=1e-6, atol=0):
+    if not np.allclose(told["timing"], [rate_of(scene), stretch_of(scene)], rtol=1e-6, atol=0):
         return RETIMED.format(remedy)
     if not first <= frame <= last:
         rendered = scene.frame_start <= frame <= scene.frame_end
@@ -114,8 +114,3 @@ def _print(path: str, _written: int, size: int) -> str:
             file.seek(place)
             number = zlib.crc32(file.read(PIECE), number)
     return f"{number:08x}"
-
-
-def _timing(scene) -> list[float]:
-    render = scene.render
-    return [render.fps / render.fps_base, render.frame_map_new / render.frame_map_old]

@@ -5,6 +5,7 @@ import bpy
 
 from ..session import session
 from .carried import bodies_of, hairs_of
+from .clock import rate_of, stretch_of
 from .rigging import posture, reached, rigging
 
 
@@ -34,8 +35,8 @@ def timing_of(scene) -> tuple:
     return (
         *frames_of(scene),
         scene.neuralocks.subframes,
-        scene.render.frame_map_new / scene.render.frame_map_old,
-        round(scene.render.fps / scene.render.fps_base, 6),
+        stretch_of(scene),
+        round(rate_of(scene), 6),
         round(scene.unit_settings.scale_length, 9),
     )
 

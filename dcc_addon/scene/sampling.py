@@ -23,12 +23,12 @@ from . import body as body_reader
 from . import body_drawn, riding, rigid_parts
 from .binding import bind_places, hidden
 from .carried import bodies_of, hairs_of
+from .clock import rate_of, shown_frame
 from .layers import graph_of, layer_of, working_in
 from .lookup import find, named
 from .placing import world
 from .relations import found_anew
 from .sampled_from import frames_of, key_of, moved_by, posture_of, rigging_of
-from .shown import shown_frame
 from .stepping import step, stepping
 from .watched import watched
 
@@ -91,7 +91,7 @@ class _Recording:
         self._posture, self._moved_by = posture_of(armature, self._scene), moved_by(armature, self._scene)
         self._edits = session.edits
         self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
-        self._rate = self._scene.render.fps / self._scene.render.fps_base
+        self._rate = rate_of(self._scene)
         self._unit = self._scene.unit_settings.scale_length
         count, bones = len(self.frames), len(self._rig.bones)
         self._block = min(BLOCK, max(1, MANY // bones))

@@ -1,16 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a view layer shows, and so evaluates; what is rendered; and which frame is shown."""
+"""What a view layer shows, and so evaluates; and what is rendered."""
 
 from collections.abc import Iterator
 
 from .animated import animated
-
-
-def shown_frame(scene) -> float:
-    """The frame that is shown, with its fraction, as the timeline counts; Blender's `frame_current_final` counts
-    stretched time.
-    """
-    return scene.frame_current + scene.frame_subframe
 
 
 def enabled(thing, layer, mode: str = "VIEWPORT") -> bool:

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..session import session
 from . import actions, rotations
+from .clock import shown_frame
 from .lookup import find
-from .shown import shown_frame
 from .unkeyed import Unkeyed
 
 

@@ -218,7 +218,7 @@ def _read_usd(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Auth
             for prim in closed
         ]
     )
-    notes += few([no_points(str(prim.GetPath())) for prim in empty]) + of_other_kinds(stage)
+    notes += few([no_points(str(prim.GetPath())) for prim in empty]) + few(of_other_kinds(stage))
     filled = [prim for prim in hair if prim not in empty]
     for prim, place in zip(filled, _places(filled), strict=True):
         curves = UsdGeom.BasisCurves(prim)

@@ -33,9 +33,8 @@ def other_hair(rigs: Sequence[StageRig]) -> list[str]:
 
 
 def of_other_kinds(stage: Usd.Stage) -> list[str]:
-    """The line on the first prim of NURBS or Hermite curves in a file of hair, with how many more there are."""
-    others = _others(stage)
-    return [_left_out(others[0]) + (f" ({len(others) - 1} more)" if len(others) > 1 else "")] if others else []
+    """A line for each prim of NURBS or Hermite curves in a file of hair."""
+    return [_left_out(prim) for prim in _others(stage)]
 
 
 def _others(stage: Usd.Stage) -> list[Usd.Prim]:
