@@ -76,7 +76,7 @@ def _motion(layout, armature, scene) -> None:
     if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
         words(layout, f"The head is {width:.2g} m wide; check the scene's Unit Scale or the armature's scale", "ERROR")
     if character.loop and sampled is not None:
-        gap = sampled.motion.gap()
+        gap = sampled.motion.gap
         if gap > LOOP_GAP:
             first, last = sampled.motion.frames[[0, -1]]
             words(layout, f"Frame {last:g} differs from frame {first:g} by {gap:.0f} degrees", "ERROR")

@@ -38,7 +38,7 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     try:
         made = make_way(path)
         try:
-            with own_folder(path.parent) as folder:
+            with scratch_folder(path.parent) as folder:
                 part = folder / path.name
                 yield part
                 reach_disk(part)
@@ -62,7 +62,7 @@ def check_writable(path: Path) -> None:
     try:
         made = make_way(path)
         try:
-            with own_folder(path.parent):
+            with scratch_folder(path.parent):
                 pass
         finally:
             remove_empty(made)
@@ -105,7 +105,7 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
 
 
 @contextmanager
-def own_folder(parent: Path) -> Iterator[Path]:
+def scratch_folder(parent: Path) -> Iterator[Path]:
     """A new hidden folder, removed with all its content at the end. Unlike one of `tempfile`, whose private rights on Windows stay
     with files that are moved out of it, it has the usual rights, and it fails at once where no folder can be made.
 

@@ -17,6 +17,8 @@ STILL = 0.01
 """Mean speed [m/s] under which the reference itself counts as standing still."""
 MOTIONLESS = 1e-4
 """Mean speed [m/s] of the reference over a clip below which nothing can be measured relative to its motion."""
+ROUNDING = 2e-6
+"""How far rounding may push a vertex [m]: the spacing of float32 coordinates 20 m from the origin."""
 DEEP = 0.003
 """Depth [m] at which a vertex inside the body begins to show."""
 LIVELY = 0.005
@@ -81,9 +83,8 @@ def penetration(distance: np.ndarray, rest_distance: np.ndarray) -> dict[str, fl
     def share(inside: np.ndarray) -> float:
         return float("nan") if np.isnan(worst) else 100 * _mean(inside)  # NaN compares false, as if outside
 
-    # The spacing of float32 coordinates 20 m from the origin: rounding is not penetration.
     return {
-        "penetration_percent": share(depth > 2e-6),
+        "penetration_percent": share(depth > ROUNDING),
         "penetration_3mm_percent": share(depth > DEEP),
         "penetration_worst_mm": 1000 * worst,
         "inside_at_rest_percent": share(rest_distance < 0),

@@ -10,7 +10,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.flags import flag
 from neuralocks_core.number_arrays import number_array
-from neuralocks_core.rotation import from_vector, polar, to_vector
+from neuralocks_core.rotation import angle_between, flat, from_vector, polar, to_vector
 
 G = 9.81
 """Size of gravity [m/s^2]."""
@@ -166,6 +166,15 @@ def time_array(given) -> np.ndarray:
     if times.ndim > 1:
         raise NeuralocksError(f"times: are of shape {times.shape}; give (n,) seconds")
     return times
+
+
+def loop_turns(ends: np.ndarray) -> np.ndarray:
+    """How far each joint is turned (J,) [degrees] between the transforms (2, J, 4, 4) in the world of a loop's first and last
+    sample; 0 for joints that are scaled to zero.
+    """
+    linear = np.asarray(ends)[..., :3, :3]
+    turns = np.degrees(angle_between(*polar(linear)[0]))
+    return np.where(flat(linear).any(axis=0), 0.0, turns)
 
 
 def _blend(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:

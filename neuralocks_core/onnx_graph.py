@@ -15,12 +15,13 @@ class OnnxGraph:
 
     Args:
         name: of the graph.
+        remedy: what a user can do about weights that are not finite.
 
     Raises:
         NeuralocksError: onnx is not installed.
     """
 
-    def __init__(self, name: str):
+    def __init__(self, name: str, remedy: str):
         try:
             from onnx import helper, numpy_helper
         except ImportError:
@@ -28,7 +29,7 @@ class OnnxGraph:
                 'onnx: not installed, it writes the model\'s graph; pip install "neuralocks[train]"'
             ) from None
         self.helper, self.numpy_helper = helper, numpy_helper
-        self.name, self.nodes, self.constants = name, [], []
+        self.name, self.remedy, self.nodes, self.constants = name, remedy, [], []
 
     def constant(self, name: str, array: np.ndarray) -> str:
         """Add an array under this name; returns the name.
@@ -37,7 +38,7 @@ class OnnxGraph:
             NeuralocksError: it holds NaN or infinity, as after a training that diverged.
         """
         if not np.isfinite(array).all():
-            raise NeuralocksError(f"{self.name}: NaN or infinity in {name}; train with a smaller --set rate")
+            raise NeuralocksError(f"{self.name}: NaN or infinity in {name}; {self.remedy}")
         self.constants.append(self.numpy_helper.from_array(np.ascontiguousarray(array), name))
         return name
 

@@ -7,8 +7,8 @@ from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import ModuleType
 
+from neuralocks_core.cache_folder import cache_folder, writable
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.own_folder import own_folder, writable
 
 
 def start_warp(device: str) -> ModuleType:
@@ -41,7 +41,7 @@ def _init(wp: ModuleType) -> None:
         wp.init()
         if writable(Path(wp.config.kernel_cache_dir)):
             return
-    wp.config.kernel_cache_dir = str(own_folder("warp") / wp.config.version)
+    wp.config.kernel_cache_dir = str(cache_folder("warp") / wp.config.version)
     wp.init()
 
 

@@ -6,11 +6,13 @@ these: the live view, the bake and the exported stage then see the same numbers.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from neuralocks_core.character import levels
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.motion import loop_turns
 from neuralocks_core.rotation import (
     Mirrored,
     from_parents,
@@ -191,14 +193,14 @@ class Motion:
         """(T,) [s]."""
         return self.frames / self.rate
 
-    def world(self) -> np.ndarray:
-        """Joints (T, J, 4, 4) in Blender's world space, from the stored channels."""
-        return from_parents(_matrices(self.translation, self.rotation, self.scale), self.parents)
+    def world(self, rows=slice(None)) -> np.ndarray:
+        """Joints (T, J, 4, 4) in Blender's world space, of all samples or of some, from the stored channels."""
+        return from_parents(_matrices(self.translation[rows], self.rotation[rows], self.scale[rows]), self.parents)
 
+    @cached_property
     def gap(self) -> float:
-        """How far the last pose is from the first [degrees]: largest turn of any joint relative to its parent. A loop has none."""
-        cosine = np.abs((self.rotation[0].astype(float) * self.rotation[-1]).sum(axis=-1))
-        return float(np.degrees(2 * np.arccos(np.clip(cosine, 0, 1)).max(initial=0.0)))
+        """How far the last pose is from the first [degrees]: largest turn of any joint in the world. A loop has none."""
+        return float(loop_turns(self.world([0, -1])).max(initial=0.0))
 
     def row(self, frame: float) -> int | None:
         """Index of the sample taken at `frame`, or None."""

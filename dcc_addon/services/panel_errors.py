@@ -35,10 +35,12 @@ WORDS = (
     ("between time codes ", "between frames "),
     ("at time code ", "at frame "),
     ("train one with random_materials=True, as the other ways of training do", "train one here"),
+    ("give --bend, --weight and --damping nearer to their defaults", "train again"),
 )
 """What the command line says, and what the panel says instead; applied in this order."""
 _CUTS = re.compile(r", or name them all if they are \(--cuts [^)]*\)")
-"""A remedy that the panel does not have."""
+_RATE = re.compile(r"train with a smaller --set rate(?: than \S+)?")
+"""Remedies that the panel does not have."""
 
 _JOINT = re.compile(r"joint '(?:[^']*/)?([^'/]+)'")
 """A bone as it is written to a file, with all bones above it."""
@@ -48,7 +50,7 @@ def for_the_panel(text: str) -> str:
     """The line of an error or a note, without options and commands of a terminal."""
     for said, shown in WORDS:
         text = text.replace(said, shown)
-    return _JOINT.sub(r"bone '\1'", _CUTS.sub("", text))
+    return _JOINT.sub(r"bone '\1'", _RATE.sub("train again", _CUTS.sub("", text)))
 
 
 def with_objects(text: str, prims: dict[str, str]) -> str:

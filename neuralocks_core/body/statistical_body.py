@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neuralocks_core.cache_folder import cache_folder, writable
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import connected_pieces
-from neuralocks_core.own_folder import own_folder, writable
 from neuralocks_core.skinned_body import Body
 
 DEFAULT_PHENOTYPE = {"gender": 1.0, "age": 2 / 3, "muscle": 0.5, "weight": 0.45, "height": 0.5, "proportions": 0.6}
@@ -116,7 +116,7 @@ def _load_anny():
     from neuralocks_core.warp_device import start_warp
 
     if not writable(get_anny_cache_path()):
-        set_anny_cache_path(own_folder("anny"))
+        set_anny_cache_path(cache_folder("anny"))
     start_warp("cpu")  # or it would print its banner to standard output, where a command's answer belongs
     return Anny(rig="game_engine", topology="anny-quads", pose_parameterization="local-ref")
 

@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from neuralocks_core.model import REMEDIES
 from neuralocks_core.onnx_graph import OnnxGraph
 
 _FLOAT, _DOUBLE = 1, 11
@@ -15,7 +16,7 @@ def rig_graph(model) -> bytes:
     Raises:
         NeuralocksError: onnx is not installed.
     """
-    graph = OnnxGraph("rig")
+    graph = OnnxGraph("rig", REMEDIES["rig"])
     limits = np.asarray(model.limits, np.float32)
     # As in the header: NaN, which compares false, becomes the lower limit. Max and Min would pass it on.
     least = graph.constant("least", -limits)

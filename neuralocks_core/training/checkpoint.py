@@ -12,6 +12,7 @@ import torch
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import read_npz, replace_npz
+from neuralocks_core.model import REMEDIES
 
 KEPT = {
     "Adam": {"step", "exp_avg", "exp_avg_sq"},
@@ -135,4 +136,4 @@ def _not_finite(arrays: dict[str, np.ndarray]) -> str:
 
 
 def _ran_away(path: Path, where: str) -> NeuralocksError:
-    return NeuralocksError(f"{path}: NaN or infinity in {where}; train with a smaller --set rate")
+    return NeuralocksError(f"{path}: NaN or infinity in {where}; {REMEDIES['strands']}")

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.model import REMEDIES
 
 Losses = Callable[[float], dict[str, torch.Tensor]]
 """Used share of the budget (0..1) -> named, weighted losses of one batch; their sum is minimised."""
@@ -98,6 +99,6 @@ def descend(
         if now - shown > 1.0 or done >= 1.0:
             shown = now
             if not (np.isfinite(list(running.values())).all() and all(bool(p.isfinite().all()) for p in parameters)):
-                remedy = remedy or f"train with a smaller --set rate than {schedule.rate:g}"
+                remedy = remedy or f"{REMEDIES['strands']} than {schedule.rate:g}"
                 raise NeuralocksError(f"training: it diverged, its loss is not finite after {step} steps; {remedy}")
             yield Descended(step, min(done, 1.0), dict(running))

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from neuralocks_core.model import REMEDIES
 from neuralocks_core.network_sizes import SHAPE, K
 from neuralocks_core.onnx_graph import OnnxGraph
 from neuralocks_core.strands.strand_set import CLAMPED
@@ -87,7 +88,7 @@ class _Graph(OnnxGraph):
 
 
 def _encoder_graph(layers, into) -> bytes:
-    graph = _Graph("encoder")
+    graph = _Graph("encoder", REMEDIES["strands"])
     if into is None:
         graph.mlp("shape", layers, "code")
     else:
@@ -97,7 +98,7 @@ def _encoder_graph(layers, into) -> bytes:
 
 def _strand_graph(net: StrandNet) -> bytes:
     half = net.strand_encoder is not None
-    graph, layer = _Graph("strand"), _folded(net.strand, net.strand_mean, net.strand_scale, half)
+    graph, layer = _Graph("strand", REMEDIES["strands"]), _folded(net.strand, net.strand_mean, net.strand_scale, half)
     if half:
         first = _folded(net.strand_encoder[0], net.strand_mean, net.strand_scale, True)
         graph.mlp("strand", [first, *net.strand_encoder[1:]], "bent")
@@ -110,7 +111,7 @@ def _strand_graph(net: StrandNet) -> bytes:
 def _frame_graph(net: StrandNet, output: str) -> bytes:
     """The body's part of the first layer, and the weights that a frame changes."""
     half = net.encoder is not None
-    graph, layer = _Graph("frame"), _folded(net.frame, net.frame_mean, net.frame_scale, half)
+    graph, layer = _Graph("frame", REMEDIES["strands"]), _folded(net.frame, net.frame_mean, net.frame_scale, half)
     hidden, outputs = len(layer[1]), {"frame_part": (1, len(layer[1]))}
     if not half:
         graph.linear("frame", layer, "frame_part")
@@ -149,7 +150,7 @@ def _frame_graph(net: StrandNet, output: str) -> bytes:
 
 def _tail_graph(net: StrandNet, output: str) -> bytes:
     """Second layer, output layer, and `networks.deform` in ONNX, so that all of it runs in the runtime's chunks."""
-    graph, hidden, width = _Graph("tail"), net.middle.in_features, net.out.out_features
+    graph, hidden, width = _Graph("tail", REMEDIES["strands"]), net.middle.in_features, net.out.out_features
     inputs = {"strand_part": ("S", hidden), "frame_part": (1, hidden), "anchor": ("S", width), "edges": ("S", width)}
     if net.motion == "modulated":
         inputs |= {"middle": (hidden, hidden), "out": (hidden, width)}

@@ -14,7 +14,7 @@ from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.motion import Clip
+from neuralocks_core.motion import Clip, loop_turns
 from neuralocks_core.rotation import from_vector
 from tests.addon.few_bones import BONES, PARENTS, PLACES, rest
 from tests.core.rigs import moved, person
@@ -114,6 +114,19 @@ def test_an_unevenly_scaled_object_is_part_of_its_bind_pose():
 def test_mirrored_armature_is_refused_in_plain_words():
     with pytest.raises(NeuralocksError, match="Rig: it is mirrored .*apply its scale"):
         similar(np.diag([-1.0, 1, 1, 1])[None], "Rig")
+
+
+def test_the_gap_of_a_loop_is_the_one_that_a_bake_tells():
+    """Six joints of a spine that are each off by 1.8 degrees turn the last one by 10.8."""
+    count, parents = 6, np.arange(6) - 1
+    world = np.tile(np.eye(4), (3, count, 1, 1))
+    for row, turn in enumerate(np.radians([0.0, 0.9, 1.8])):
+        for joint in range(count):
+            world[row, joint, :3, :3] = from_vector(np.array([0.0, 0.0, (joint + 1) * turn]))
+    motion = Motion.from_world(np.arange(3), 24, 1.0, parents, world[0], world, np.zeros((3, 0)), {})
+    assert motion.gap == pytest.approx(10.8, abs=1e-3)
+    assert motion.gap == pytest.approx(loop_turns(world[[0, -1]]).max(), abs=1e-3)
+    assert replace(motion, rotation=motion.rotation[[0, 1, 0]]).gap == 0
 
 
 def test_samples_are_found_by_frame():

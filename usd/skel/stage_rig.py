@@ -12,8 +12,7 @@ from neuralocks_core.animation.cuts import APART, find_cuts, find_flashes
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.motion import LOOP_GAP, Clip
-from neuralocks_core.rotation import angle_between, flat, polar
+from neuralocks_core.motion import LOOP_GAP, Clip, loop_turns
 
 from ..border.units import Border
 from .bind_world import bind_shown
@@ -106,10 +105,8 @@ class StageRig:
             codes: ascending time codes that were asked for.
             replaced: joints that a bake replaces; how these move does not matter.
         """
-        ends = self.cycle.joints[[0, -1], :, :3, :3]
-        turn = np.degrees(angle_between(*polar(ends)[0]))
-        turn[flat(ends).any(axis=0)] = 0  # what is scaled to zero has no turn
-        for joint in replaced:  # and what hangs from it
+        turn = loop_turns(self.cycle.joints[[0, -1]])
+        for joint in replaced:  # with what hangs from it
             turn[self.character.skeleton.below(joint)] = 0
         start, end = self.time_codes[self._repeated][[0, -1]]
         notes = []

@@ -60,7 +60,8 @@ def motion_report(
         progress: called with (done, total, message).
 
     Returns:
-        `motion_error`: rms error of `report.hair_points`, relative to hair carried rigidly (= 1);
+        `motion_error`: rms error of `report.hair_points`, relative to hair carried rigidly (= 1). Unlike `metrics.motion_error`
+        of strands, it is that of positions, not of motion about the mean: hair that hangs wrongly is wrong, too;
         `motion_error_by_kind`: the same for each kind of motion;
         `motion_ratio`: mean speed in the head's frame over the simulation's;
         `motion_depth`: hair inside the body at every eighth sample, as in `report.depths`, also for the simulation. The

@@ -5,6 +5,7 @@ import numpy as np
 import torch
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.metrics import DEEP, ROUNDING
 from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, skin
 from neuralocks_core.rig.rods import RigMaterial
@@ -106,8 +107,8 @@ def depths(distance: np.ndarray) -> dict:
     deepest = np.abs(distance.min(axis=1, initial=0.0))
     return {
         "poses": len(distance),
-        "percent": share * float((distance < 0).sum()),
-        "percent_deeper_than_3_mm": share * float((distance < -3e-3).sum()),
+        "percent": share * float((distance < -ROUNDING).sum()),
+        "percent_deeper_than_3_mm": share * float((distance < -DEEP).sum()),
         "percent_of_poses_deeper_than_5_mm": 100 * float((deepest > 5e-3).mean()),
         "worst_mm": 1e3 * float(deepest.max()),
     }

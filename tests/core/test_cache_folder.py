@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from neuralocks_core.cache_folder import cache_folder, writable
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.own_folder import own_folder, writable
 from neuralocks_core.warp_device import _init
 
 posix = pytest.mark.skipif(os.name != "posix", reason="has neither users nor modes")
@@ -18,8 +18,8 @@ posix = pytest.mark.skipif(os.name != "posix", reason="has neither users nor mod
 @posix
 def test_the_folder_is_its_users_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    folder = own_folder("warp")
-    assert writable(folder) and own_folder("warp") == folder
+    folder = cache_folder("warp")
+    assert writable(folder) and cache_folder("warp") == folder
     assert stat.S_IMODE(folder.parent.stat().st_mode) == 0o700
 
 
@@ -37,7 +37,7 @@ def test_a_folder_that_another_user_prepared_is_refused(tmp_path, monkeypatch, k
         mine.mkdir()
         mine.chmod(0o777)
     with pytest.raises(NeuralocksError, match="TMPDIR"):
-        own_folder("warp")
+        cache_folder("warp")
 
 
 def test_warp_compiles_elsewhere_where_it_cannot_make_its_folder(tmp_path, monkeypatch):

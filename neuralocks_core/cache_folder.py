@@ -9,7 +9,7 @@ from pathlib import Path
 from neuralocks_core.errors import NeuralocksError
 
 
-def own_folder(name: str) -> Path:
+def cache_folder(name: str) -> Path:
     """The folder `name`, created if needed, in a temporary folder into which only its user can put code.
 
     Raises:
