@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The handlers that Blender calls. Each is a few lines; all work is in `live`."""
+"""The handlers that Blender calls. Each only says what is done, in which order; the work is in `live`, `reported` and `scene/`."""
 
 import bpy
 from bpy.app.handlers import persistent
@@ -7,21 +7,18 @@ from bpy.app.handlers import persistent
 from neuralocks_core.errors import NeuralocksError
 
 from . import background, live, renewed
-from .edited import touched
-from .live_strands import EDITING, known, live_hairs, show_all_rest, show_rest_left
+from .live_strands import live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
+from .reported import doubt_motions, edited, forget_weights, hair_placed, mark_stale, retry_failed
 from .scene import blur
 from .scene.appended import remake
 from .scene.attach import switch_changed
-from .scene.carried import bodies_of
-from .scene.keyed import concerns, users_of
 from .scene.last_called import go_last, others_called
 from .scene.layers import working_in
 from .scene.lively import lively
 from .scene.locked import lock
 from .scene.overrides import make_comparable
 from .scene.save_as import Remade
-from .scene.shapes import follows
 from .scene.together import drawn_with
 from .scene.up_to_date import ensure
 from .scene.windows import layer_shown
@@ -59,35 +56,20 @@ def on_update(scene, graph):
         return
     live.forget_gone()
     changed = [update.id for update in graph.updates]
-    for thing in changed:
-        if isinstance(thing, bpy.types.Mesh):
-            session.weights.pop(thing.name_full, None)
-    objects = {o.name_full: o for o in changed if isinstance(o, bpy.types.Object)}
-    originals = [o.original for o in objects.values()]
-    make_comparable(originals)  # a library may have been reloaded
-    show_rest_left(originals)
+    objects = {thing.name_full: thing.original for thing in changed if isinstance(thing, bpy.types.Object)}
+    forget_weights(changed)
+    make_comparable(objects.values())  # a library may have been reloaded
+    show_rest_left(objects.values())
     if live.bereft(scene):
         live.update(scene, graph)
-    names = {a.name_full for a in live.carriers(scene)}
-    if not names:
+    carriers = live.carriers(scene)
+    if not carriers:
         return
-    meshes = {u.id.name_full for u in graph.updates if isinstance(u.id, bpy.types.Mesh) and u.is_updated_geometry}
-    bodies = [body.data for a in live.carriers(scene) for body in bodies_of(a, scene)] if meshes else ()
-    own = [thing.original for thing in changed]
-    edited = any(mesh.name_full in meshes and not follows(mesh, own) for mesh in bodies)
-    keys = [thing for thing in own if isinstance(thing, bpy.types.Action) and thing.name_full not in switched]
-    if edited or keys:
-        _mark_stale(names, [] if edited else users_of(keys))
-    if any(isinstance(o, bpy.types.Armature) or o.name_full in session.failed for o in changed):
-        session.wanting = session.wanting or bool(session.failed)
-        session.failed.clear()
-    moving = frozenset(names).union(*(session.rigs[name].moved_by for name in names & session.rigs.keys()))
-    placed = any(u.is_updated_transform and _is_live(u.id.original) for u in graph.updates)
-    if moving & objects.keys() or placed:
-        background.doubt()
-    elif any(isinstance(thing, bpy.types.Scene) for thing in changed):  # a body may be drawn or hidden
-        background.doubt(closely=False)
-    if names & objects.keys() or placed or any(_edited(o.original) for o in objects.values()):
+    mark_stale(scene, graph, changed, carriers, switched)
+    retry_failed(changed)
+    names, placed = {armature.name_full for armature in carriers}, hair_placed(graph)
+    doubt_motions(changed, objects.keys(), names, placed)
+    if names & objects.keys() or placed or any(map(edited, objects.values())):
         live.update(scene, graph)
     _catch_up()
 
@@ -190,35 +172,11 @@ def _unseen(change):
         session.paused -= 1
 
 
-def _mark_stale(names: set[str], users: list[set]) -> None:
-    """Motions are out of date, of all rigs or of those that keys with these users may move, and those are wanted of armatures of these
-    names that have none.
-    """
-    found = [rig for rig in session.rigs.values() if not users or any(concerns(own, rig.moved_by) for own in users)]
-    for sampled in found:
-        sampled.stale = True
-    session.edits += 1
-    session.failed.clear()
-    session.wanting = session.wanting or bool(found) or not names <= session.rigs.keys()
-
-
 def _catch_up() -> None:
     """Sample soon, if live hair found its motion missing or out of date."""
     if session.wanting:
         session.wanting = False
         background.request()
-
-
-def _is_live(thing) -> bool:
-    """Whether this is a live hair object."""
-    return isinstance(thing, bpy.types.Object) and thing.type == "CURVES" and thing.neuralocks_hair.live
-
-
-def _edited(thing) -> bool:
-    """Whether this is live hair that enters or leaves editing, or was given other strands or points."""
-    if not _is_live(thing):
-        return False
-    return thing.mode in EDITING or not known(thing) or touched(thing)
 
 
 HANDLERS = {

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an update of Blender's reports as edited, and what that puts out of date or in doubt. `changed` are the data blocks that it
+names, as evaluated.
+"""
+
+import bpy
+
+from . import background
+from .edited import touched
+from .live_strands import EDITING, known
+from .scene.carried import bodies_of
+from .scene.keyed import concerns, users_of
+from .scene.shapes import follows
+from .session import session
+
+
+def forget_weights(changed) -> None:
+    """Weights of meshes that were edited are read again."""
+    for thing in changed:
+        if isinstance(thing, bpy.types.Mesh):
+            session.weights.pop(thing.name_full, None)
+
+
+def mark_stale(scene, graph, changed, carriers, switched: set[str]) -> None:
+    """Motions are out of date if a body of these armatures was edited, or keys of any action that was not just `switched`."""
+    own = [thing.original for thing in changed]
+    edited = _edits_body(scene, graph, own, carriers)
+    keys = [thing for thing in own if isinstance(thing, bpy.types.Action) and thing.name_full not in switched]
+    if not (edited or keys):
+        return
+    users = [] if edited else users_of(keys)
+    found = [rig for rig in session.rigs.values() if not users or any(concerns(each, rig.moved_by) for each in users)]
+    for sampled in found:
+        sampled.stale = True
+    session.edits += 1
+    session.failed.clear()
+    lacking = any(armature.name_full not in session.rigs for armature in carriers)
+    session.wanting = session.wanting or bool(found) or lacking
+
+
+def retry_failed(changed) -> None:
+    """Motions that could not be sampled are wanted again if one of their armatures or any rest pose was edited."""
+    if any(isinstance(thing, bpy.types.Armature) or thing.name_full in session.failed for thing in changed):
+        session.wanting = session.wanting or bool(session.failed)
+        session.failed.clear()
+
+
+def hair_placed(graph) -> bool:
+    """Whether a live hair object was put elsewhere."""
+    return any(update.is_updated_transform and _is_live(update.id.original) for update in graph.updates)
+
+
+def doubt_motions(changed, objects, names: set[str], placed: bool) -> None:
+    """Motions of armatures of these names may be out of date if one of these `objects`, by name, moves them, if hair was `placed`
+    elsewhere, or if a scene was edited, where a body may be drawn or hidden.
+    """
+    moving = names.union(*(session.rigs[name].moved_by for name in names & session.rigs.keys()))
+    if moving & objects or placed:
+        background.doubt()
+    elif any(isinstance(thing, bpy.types.Scene) for thing in changed):
+        background.doubt(closely=False)
+
+
+def edited(thing) -> bool:
+    """Whether this is live hair that enters or leaves editing, or was given other strands or points."""
+    if not _is_live(thing):
+        return False
+    return thing.mode in EDITING or not known(thing) or touched(thing)
+
+
+def _edits_body(scene, graph, own: list, carriers) -> bool:
+    """Whether an update, of these data blocks of the file, edits a body by more than what its shape keys read."""
+    updates = (update for update in graph.updates if isinstance(update.id, bpy.types.Mesh))
+    meshes = {update.id.name_full for update in updates if update.is_updated_geometry}
+    bodies = [body.data for armature in carriers for body in bodies_of(armature, scene)] if meshes else ()
+    return any(mesh.name_full in meshes and not follows(mesh, own) for mesh in bodies)
+
+
+def _is_live(thing) -> bool:
+    """Whether this is a live hair object."""
+    return isinstance(thing, bpy.types.Object) and thing.type == "CURVES" and thing.neuralocks_hair.live
