@@ -7,15 +7,15 @@ has one, by hierarchy, `limb_chains`), and the trunk by hierarchy: the upper che
 arms meet.
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from neuralocks_core.anatomy.head_by_names import head_by_names
 from neuralocks_core.anatomy.joint_names import find_joint, leaf, sides_and_keys
 from neuralocks_core.anatomy.limb_chains import below_first
-from neuralocks_core.anatomy.limb_names import PARTS, ancestors, depth, named_limbs
+from neuralocks_core.anatomy.limb_names import PARTS, ancestors, named_limbs
 from neuralocks_core.anatomy.limb_shapes import limbs_by_shape
 from neuralocks_core.errors import NeuralocksError
 
@@ -28,7 +28,6 @@ SHRUGGED = 0.05
 COPIED = 1e-4
 """Joints nearer to each other than this share of the rig's size are in the same place."""
 _SPINE = ("spine", "chest", "torso", "waist", "abdomen")
-_NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 
 
 class NoHead(NeuralocksError):
@@ -95,41 +94,15 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
         NoHead: no joint is named like a head.
         NeuralocksError: a joint given by hand does not exist.
     """
-    names, parents = list(names), np.asarray(parents, int)
-    joints: dict[str, int] = {}
-    reasons: dict[str, str] = {}
-
-    def put(name, joint, reason):
-        if joint is not None and name not in joints:
-            joints[name], reasons[name] = int(joint), reason
-
-    for name, wanted in (by_hand or {}).items():
-        if name not in SEMANTIC:
-            raise NeuralocksError(f"--joint {name}=...: there is no such meaning; use one of {', '.join(SEMANTIC)}")
-        put(name, find_joint(names, wanted), BY_HAND)
-
-    parts = {word for words in PARTS.values() for word in words}
-    sides, keys = zip(*sides_and_keys([leaf(name) for name in names], parts), strict=True)
-    for side in ("left", "right"):
-        for part, joint in named_limbs(side, sides, keys, parents).items():
-            put(f"{side}_{part}", joint, f"by name '{leaf(names[joint])}'")
-    named, reason = _find_head(names, sides, keys, parents, positions, skinned)
-    put("head", named, reason)
-    if "head" not in joints:
-        raise NoHead("skeleton: no joint is named like a head; name it with --head JOINT")
-    others = copies(joints["head"], parents, positions)
-    way = ancestors(named if named in others else joints["head"], parents)
-    if positions is not None:
-        _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions, way)
-    _follow_limbs(joints, put, names, keys, parents, positions)
-    _find_trunk(joints, put, names, keys, parents, positions, way)
-    if reasons["head"] != BY_HAND and skinned is not None and not skinned[_below(joints["head"], parents)].any():
-        with_skin = [joint for joint in others if skinned[joint]]
-        if with_skin:
-            control, joints["head"] = leaf(names[joints["head"]]), with_skin[0]
-            reasons["head"] = f"moves the skin in the place of the control '{control}'"
-    ordered = {name: joints[name] for name in SEMANTIC if name in joints}
-    return Humanoid(ordered, {name: reasons[name] for name in ordered})
+    search = _Search(names, parents, positions, by_hand or {}, skinned)
+    search.find_named_limbs()
+    search.find_head()
+    search.find_unnamed_limbs()
+    search.follow_limbs()
+    search.find_trunk()
+    search.find_head_with_skin()
+    ordered = {name: search.joints[name] for name in SEMANTIC if name in search.joints}
+    return Humanoid(ordered, {name: search.reasons[name] for name in ordered})
 
 
 def named_head(names) -> str | None:
@@ -154,65 +127,171 @@ def copies(joint: int, parents, positions) -> list[int]:
     return np.flatnonzero(near).tolist()
 
 
-def _follow_limbs(joints, put, names, keys, parents, positions) -> None:
-    """Find a limb's unnamed joints below its first joint."""
-    for side in ("left", "right"):
-        for first, *rest in (tuple(f"{side}_{part}" for part in limb) for limb in LIMBS.values()):
-            if first not in joints or rest[0] in joints:
-                continue
-            begin, end = joints[first], joints.get(rest[1])
-            taken = {joint for name, joint in joints.items() if name.startswith(side)}
-            below = below_first(begin, end, keys, parents, positions, taken)
-            for name, joint in zip(rest, below, strict=True):
-                put(name, joint, f"below '{leaf(names[begin])}'")
+class _Search:
+    """What is found so far, step by step; what an earlier step found stays.
 
+    Attributes:
+        names, parents, positions, skinned: the arguments of `find_humanoid`.
+        sides, keys: of each joint (J), as `sides_and_keys` gives them.
+        joints, reasons: of the `Humanoid`.
+        others: copies of the head.
+        way: the head, or the one of its copies that is named so, and its ancestors up to the root.
+    """
 
-def _find_unnamed_limbs(joints, reasons, put, names, sides, parents, positions, way) -> None:
-    """Find arms if no arm was found by name, and likewise legs."""
-    lacking = [limb for limb in LIMBS if not any(f"{side}_upper_{limb}" in joints for side in ("left", "right"))]
-    if lacking:
-        found = limbs_by_shape(way, parents, positions, sides)
+    def __init__(self, names, parents, positions, by_hand: dict[str, str], skinned):
+        self.names, self.parents, self.skinned = list(names), np.asarray(parents, int), skinned
+        self.positions = None if positions is None else np.asarray(positions, float)
+        self.joints: dict[str, int] = {}
+        self.reasons: dict[str, str] = {}
+        for name, wanted in by_hand.items():
+            if name not in SEMANTIC:
+                raise NeuralocksError(f"--joint {name}=...: there is no such meaning; use one of {', '.join(SEMANTIC)}")
+            self.put(name, find_joint(self.names, wanted), BY_HAND)
+        parts = {word for words in PARTS.values() for word in words}
+        self.sides, self.keys = zip(*sides_and_keys([leaf(name) for name in self.names], parts), strict=True)
+
+    def put(self, name: str, joint: int | None, reason: str) -> None:
+        """Note the joint for a semantic name that has none yet; nothing if `joint` is None."""
+        if joint is not None and name not in self.joints:
+            self.joints[name], self.reasons[name] = int(joint), reason
+
+    def quoted(self, joint: int) -> str:
+        """A joint's own name."""
+        return f"'{leaf(self.names[joint])}'"
+
+    def find_named_limbs(self) -> None:
+        for side in ("left", "right"):
+            for part, joint in named_limbs(side, self.sides, self.keys, self.parents).items():
+                self.put(f"{side}_{part}", joint, f"by name {self.quoted(joint)}")
+
+    def find_head(self) -> None:
+        """Find the head by names, and the way from it to the root.
+
+        Raises:
+            NoHead: there is none.
+        """
+        rig = self.names, self.sides, self.keys, self.parents, self.positions, self.skinned
+        named, reason = head_by_names(*rig) or (None, "")
+        self.put("head", named, reason)
+        if "head" not in self.joints:
+            raise NoHead("skeleton: no joint is named like a head; name it with --head JOINT")
+        self.others = copies(self.joints["head"], self.parents, self.positions)
+        self.way = ancestors(named if named in self.others else self.joints["head"], self.parents)
+
+    def find_unnamed_limbs(self) -> None:
+        """Find arms if no arm was found by name, and likewise legs."""
+        lacking = [limb for limb in LIMBS if not self._both(f"upper_{limb}")]
+        if self.positions is None or not lacking:
+            return
+        found = limbs_by_shape(self.way, self.parents, self.positions, self.sides)
         for name, joint in (each for limb in lacking for each in found.get(limb, {}).items()):
             lower = name.replace("upper", "lower")
-            if lower != name and joints.get(lower) == joint and reasons[lower] != BY_HAND:
-                del joints[lower]  # `Leg` is the lower leg only below another leg joint
-            put(name, joint, f"by its place, '{leaf(names[joint])}'")
+            if lower != name and self.joints.get(lower) == joint and self.reasons[lower] != BY_HAND:
+                del self.joints[lower]  # `Leg` is the lower leg only below another leg joint
+            self.put(name, joint, f"by its place, {self.quoted(joint)}")
+
+    def follow_limbs(self) -> None:
+        """Find a limb's unnamed joints below its first joint."""
+        for side in ("left", "right"):
+            for first, *rest in (tuple(f"{side}_{part}" for part in limb) for limb in LIMBS.values()):
+                if first not in self.joints or rest[0] in self.joints:
+                    continue
+                begin, end = self.joints[first], self.joints.get(rest[1])
+                taken = {joint for name, joint in self.joints.items() if name.startswith(side)}
+                below = below_first(begin, end, self.keys, self.parents, self.positions, taken)
+                for name, joint in zip(rest, below, strict=True):
+                    self.put(name, joint, f"below {self.quoted(begin)}")
+
+    def find_trunk(self) -> None:
+        """Find the rest on the way from the head to the root."""
+        arms, legs = self._both("upper_arm"), self._both("upper_leg")
+        if arms:
+            meeting = self._meeting(arms)
+            self._find_neck_with_arms(meeting)
+            self._find_chest_without_arms(meeting)
+            self.put("upper_chest", meeting, "where the ways from head and arms meet")
+        if legs:
+            self.put("hips", self._meeting(legs), "where the ways from head and legs meet")
+        self._find_neck()
+        self._find_spine()
+        self.put("hips", self.way[-1], "root of the trunk")
+
+    def find_head_with_skin(self) -> None:
+        """Take the copy of a control that moves the skin for the head."""
+        head = self.joints["head"]
+        if self.reasons["head"] == BY_HAND or self.skinned is None or self.skinned[_below(head, self.parents)].any():
+            return
+        with_skin = [joint for joint in self.others if self.skinned[joint]]
+        if with_skin:
+            self.joints["head"] = with_skin[0]
+            self.reasons["head"] = f"moves the skin in the place of the control {self.quoted(head)}"
+
+    def _find_neck_with_arms(self, meeting: int | None) -> None:
+        """Biped parents the collar bones to the neck."""
+        if meeting is None or not ("neck" in self.keys[meeting] or meeting == self.joints.get("neck")):
+            return
+        trunk = [joint for joint in self._under(meeting) if "neck" not in self.keys[joint]]
+        if trunk:
+            neck = self.quoted(meeting)
+            self.put("neck", meeting, f"where the ways from head and arms meet, {neck}")
+            self.put("upper_chest", trunk[0], f"below the neck {neck}")
+
+    def _find_chest_without_arms(self, meeting: int | None) -> None:
+        """Arms may be parented to the root, as in exports of deform bones only, or to another copy of the trunk."""
+        spine = [joint for joint in self.way[1:] if any(word in self.keys[joint] for word in _SPINE)]
+        if spine and (meeting is None or meeting in self._under(spine[-1])):
+            chest = self._under_shoulders(spine)
+            place = f"between the shoulders, {self.quoted(chest)}"
+            self.put("upper_chest", chest, f"{place}, since the arms hang from elsewhere")
+
+    def _under_shoulders(self, spine: list[int]) -> int:
+        """The joint of a spine, from the head down, nearest the head of those that are not above the shoulders: where necks are
+        numbered like spines, the joints above are the neck.
+        """
+        if self.positions is None:
+            return spine[0]
+        arms = {name: joint for name, joint in self.joints.items() if "upper_arm" in name}
+        shoulders = [self.joints.get(name.replace("upper_arm", "shoulder"), arm) for name, arm in arms.items()]
+        up = self.positions[self.way[0]] - self.positions[spine[-1]]
+        most = self.positions[shoulders].mean(axis=0) @ up + SHRUGGED * up @ up
+        return next((joint for joint in spine if self.positions[joint] @ up <= most), spine[0])
+
+    def _find_neck(self) -> None:
+        between = _before(self.joints.get("upper_chest"), self.way[1:])
+        named = [joint for joint in between if "neck" in self.keys[joint]]
+        # `MCH-ROT-neck` above `neck` is a helper of a control rig, and does not turn with it.
+        necks = [joint for joint in named if self.keys[joint] == "neck"] or named
+        if not necks and "upper_chest" in self.joints:
+            necks = between
+        if necks:
+            self.put("neck", necks[-1], f"between head and chest, {self.quoted(necks[-1])}")
+
+    def _find_spine(self) -> None:
+        if "upper_chest" not in self.joints:
+            self.put("upper_chest", self.way[min(2, len(self.way) - 1)], "two joints below the head")
+            return
+        below = _before(self.joints.get("hips"), self._under(self.joints["upper_chest"]))
+        if below:
+            self.put("chest", below[0], "below the upper chest")
+            self.put("spine", below[-1], "above the hips")
+
+    def _both(self, part: str) -> list[int]:
+        """Joints of this part of a limb that were found, the left one first."""
+        return [self.joints[name] for name in (f"left_{part}", f"right_{part}") if name in self.joints]
+
+    def _meeting(self, limbs: list[int]) -> int | None:
+        """Where the ways from the head and from these joints to the root meet, if they do below the head."""
+        ways = [ancestors(joint, self.parents) for joint in limbs]
+        return next((joint for joint in self.way[1:] if all(joint in way for way in ways)), None)
+
+    def _under(self, joint: int) -> list[int]:
+        """The way from a joint to the root, without it; empty if the way from the head passes it by."""
+        return self.way[self.way.index(joint) + 1 :] if joint in self.way else []
 
 
-def _find_head(names, sides, keys, parents, positions, skinned):
-    def score(i):
-        key = keys[i]
-        # XNALara's `head neck lower` is a neck, its `head neck upper` the head.
-        return (key != "head", not key.endswith("head"), "lower" in key, depth(i, parents), i)
-
-    def beside_head(i):
-        """Hair chains hang from necks too: the head is in the middle, and farthest along the neck."""
-        at = None if positions is None else np.asarray(positions, float)
-        along = 0.0 if at is None or parents[neck] < 0 else (at[i] - at[neck]) @ (at[neck] - at[parents[neck]])
-        return (bool(sides[i]), any(bad in keys[i] for bad in _NOT_HEAD), -along, i)
-
-    hits = [
-        i
-        for i in range(len(keys))
-        if "head" in keys[i] and not sides[i] and not any(bad in keys[i].replace("head", "") for bad in _NOT_HEAD)
-    ]
-    if hits:
-        best = min(hits, key=score)
-        return best, f"by name '{leaf(names[best])}'"
-    necks = [i for i in range(len(keys)) if "neck" in keys[i] and not sides[i]]
-    if necks:
-        neck = max(necks, key=lambda i: depth(i, parents))
-        children = [i for i in range(len(keys)) if parents[i] == neck]
-        if children:
-            return min(children, key=beside_head), f"child of the neck '{leaf(names[neck])}'"
-    # Rigify's deform bones number the whole trunk spine, spine.001 ... spine.006, the last of which is the head; an animal's begin
-    # with its tail. Exports of these keep bones of other layers with the same numbers, which move no skin themselves.
-    spine = [i for i in range(len(keys)) if keys[i] == "spine" and not sides[i]]
-    if len(spine) >= 5:
-        own = np.ones(len(names), bool) if skinned is None else skinned
-        best = max(spine, key=lambda i: (int("0" + re.search(r"\d{0,9}$", names[i])[0]), own[i], depth(i, parents)))
-        return best, f"last joint of the spine '{leaf(names[best])}'"
-    return None, ""
+def _before(end: int | None, way: list[int]) -> list[int]:
+    """The joints of a way before one of them; all if it is not on the way."""
+    return way[: way.index(end)] if end in way else way
 
 
 def _below(joint: int, parents) -> list[int]:
@@ -220,63 +299,3 @@ def _below(joint: int, parents) -> list[int]:
     found = {joint}
     found.update(other for other, parent in enumerate(parents) if parent in found)  # parents come first
     return sorted(found)
-
-
-def _under_shoulders(spine: list[int], head: int, shoulders: list[int], positions) -> int:
-    """The joint of a spine, from the head down, nearest the head of those that are not above the shoulders: where necks are numbered
-    like spines, the joints above are the neck.
-    """
-    if positions is None:
-        return spine[0]
-    places = np.asarray(positions, float)
-    up = places[head] - places[spine[-1]]
-    most = places[shoulders].mean(axis=0) @ up + SHRUGGED * up @ up
-    return next((joint for joint in spine if places[joint] @ up <= most), spine[0])
-
-
-def _find_trunk(joints, put, names, keys, parents, positions, head_way) -> None:
-    def meet(*others):
-        shared = set(head_way)
-        for other in others:
-            shared &= set(ancestors(other, parents))
-        return next((joint for joint in head_way if joint in shared and joint != head_way[0]), None)
-
-    arms = [joints[n] for n in ("left_upper_arm", "right_upper_arm") if n in joints]
-    legs = [joints[n] for n in ("left_upper_leg", "right_upper_leg") if n in joints]
-    meeting = meet(*arms) if arms else None
-    if meeting is not None and ("neck" in keys[meeting] or meeting == joints.get("neck")):
-        # Biped parents the collar bones to the neck.
-        trunk = [joint for joint in head_way[head_way.index(meeting) + 1 :] if "neck" not in keys[joint]]
-        if trunk:
-            put("neck", meeting, f"where the ways from head and arms meet, '{leaf(names[meeting])}'")
-            put("upper_chest", trunk[0], f"below the neck '{leaf(names[meeting])}'")
-    spine = [joint for joint in head_way[1:] if any(word in keys[joint] for word in _SPINE)]
-    if arms and spine and (meeting is None or meeting in head_way[head_way.index(spine[-1]) + 1 :]):
-        # Arms parented to the root, as in exports of deform bones only, or to another copy of the trunk.
-        sides = [
-            joints.get(name.replace("upper_arm", "shoulder"), joints[name]) for name in joints if "upper_arm" in name
-        ]
-        chest = _under_shoulders(spine, head_way[0], sides, positions)
-        put("upper_chest", chest, f"between the shoulders, '{leaf(names[chest])}', since the arms hang from elsewhere")
-    if arms:
-        put("upper_chest", meeting, "where the ways from head and arms meet")
-    if legs:
-        put("hips", meet(*legs), "where the ways from head and legs meet")
-    between = head_way[1:]
-    if "upper_chest" in joints and joints["upper_chest"] in between:
-        between = between[: between.index(joints["upper_chest"])]
-    named = [joint for joint in between if "neck" in keys[joint]]
-    # `MCH-ROT-neck` above `neck` is a helper of a control rig, and does not turn with it.
-    named = [joint for joint in named if keys[joint] == "neck"] or named
-    neck = named[-1] if named else (between[-1] if between and "upper_chest" in joints else None)
-    put("neck", neck, f"between head and chest, '{leaf(names[neck])}'" if neck is not None else "")
-    if "upper_chest" in joints:
-        below = head_way[head_way.index(joints["upper_chest"]) + 1 :] if joints["upper_chest"] in head_way else []
-        if "hips" in joints and joints["hips"] in below:
-            below = below[: below.index(joints["hips"])]
-        if below:
-            put("chest", below[0], "below the upper chest")
-            put("spine", below[-1], "above the hips")
-    else:
-        put("upper_chest", head_way[min(2, len(head_way) - 1)], "two joints below the head")
-    put("hips", head_way[-1], "root of the trunk")
