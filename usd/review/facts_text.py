@@ -23,27 +23,38 @@ def as_text(facts: dict, indent: int = 0) -> str:
         elif isinstance(value, dict):
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
         elif isinstance(value, list) and value and isinstance(value[0], dict):
-            if len(value[0]) <= 3:  # a line each
-                lines.append(f"{pad}{name}:")
-                for first, *others in (entry.items() for entry in value):
-                    lines.append(f"{pad}  {first[1]}: {', '.join(f'{k} {v}' for k, v in others)}")
-                continue
-            for entry, *same in grouped(value, lambda entry: without_paths(repr(entry))):
-                lines += [f"{pad}{name[:-1] if name.endswith('s') else name}:", as_text(entry, indent + 1)]
-                if same:
-                    lines.append(f"{pad}  likewise: {', '.join(str(next(iter(each.values()))) for each in same)}")
+            lines += _each(name, value, indent)
         elif name == "joint names":
             lines.append(f"{pad}{name}: {', '.join(map(leaf, value))}")
-        elif isinstance(value, list):
-            lines.append(f"{pad}{name}: {', '.join(str(v) for v in value) or 'none'}")
         else:
-            lines.append(
-                f"{pad}{name}: {'none' if value is None else f'{value:g}' if isinstance(value, float) else value}"
-            )
+            lines.append(f"{pad}{name}: {_short(value)}")
     if indent == 0:
         lines += [f"would stop a bake: {line}" for line in told_once(facts.get("stops", []))]
         lines += [f"note: {line}" for line in told_once(facts.get("spoils", []))]
     return "\n".join(line for line in lines if line)
+
+
+def _each(name: str, entries: list[dict], indent: int) -> list[str]:
+    """Lines of several facts of one kind: a line each if they are short."""
+    pad = "  " * indent
+    if len(entries[0]) <= 3:
+        lines = [f"{pad}{name}:"]
+        for (_, first), *others in (entry.items() for entry in entries):
+            lines.append(f"{pad}  {first}: {', '.join(f'{k} {v}' for k, v in others)}")
+        return lines
+    lines = []
+    for entry, *same in grouped(entries, lambda entry: without_paths(repr(entry))):
+        lines += [f"{pad}{name.removesuffix('s')}:", as_text(entry, indent + 1)]
+        if same:
+            lines.append(f"{pad}  likewise: {', '.join(str(next(iter(each.values()))) for each in same)}")
+    return lines
+
+
+def _short(value) -> str:
+    """A value, or a list of values, in a line."""
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "none"
+    return "none" if value is None else f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
 def _trainings(card) -> int:
