@@ -13,6 +13,7 @@ from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.anatomy.standing import FEET
 from neuralocks_core.anatomy.upright import AXES, standing_axis, upright
 from neuralocks_core.character import Skeleton
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.formats.bvh_words import LARGEST, Words
 from neuralocks_core.motion import LARGEST_CLIP, Clip
 from neuralocks_core.rotation import angle_between
@@ -87,6 +88,7 @@ def read_bvh(path: str | Path) -> Motion:
 class _Joint:
     name: str
     parent: int
+    path_length: int
     offset: np.ndarray
     channels: tuple[str, ...] = ()
     end: np.ndarray | None = None
@@ -95,44 +97,61 @@ class _Joint:
 def _hierarchy(words: Words) -> list[_Joint]:
     words.expect("HIERARCHY")
     joints: list[_Joint] = []
-    open_joints: list[int] = []
-    lengths: list[int] = []
-    in_end = False
+    within = -1
     while True:
         word = words.next()
-        key = word.upper()
-        if key == "MOTION" and not open_joints and joints:
+        key, joint = word.upper(), joints[within] if within >= 0 else None
+        if key == ("JOINT" if joint else "ROOT") and len(joints) < MOST_JOINTS:
+            joints.append(_begun(words, joints, within))
+            within = len(joints) - 1
+        elif key == "MOTION" and joints and not joint:
             return joints
-        if key in ("ROOT", "JOINT"):
-            if (key == "ROOT") == bool(open_joints) or in_end or len(joints) >= MOST_JOINTS:
-                raise words.error(f"joint {len(joints)} stands in a wrong place")
-            name = _name(words)
-            joints.append(_Joint(name, open_joints[-1] if open_joints else -1, np.zeros(3)))
-            lengths.append(len(name) + (1 + lengths[open_joints[-1]] if open_joints else 0))
-            if sum(lengths) > MOST_NAMES:
-                raise words.error(f"has joint paths of more than {MOST_NAMES} characters", "shorten the names")
-            open_joints.append(len(joints) - 1)
-        elif key == "END" and open_joints and not in_end:
-            in_end = True
-            while words.next() != "{":
-                pass
-        elif key == "OFFSET" and open_joints:
-            offset = np.array([words.number() for _ in range(3)])
-            if in_end:
-                joints[open_joints[-1]].end = offset
-            else:
-                joints[open_joints[-1]].offset = offset
-        elif key == "CHANNELS" and open_joints and not in_end:
-            channels = tuple(words.next().lower() for _ in range(words.count(6, "channels")))
-            if len(set(channels)) != len(channels) or not set(channels) <= _CHANNELS:
-                raise words.error(f"joint '{joints[open_joints[-1]].name}' has channels {' '.join(channels)[:80]}")
-            joints[open_joints[-1]].channels = channels
-        elif word == "}" and open_joints:
-            if not in_end:
-                open_joints.pop()
-            in_end = False
+        elif key == "END" and joint:
+            _read_end(words, joints, joint)
+        elif key == "OFFSET" and joint:
+            joint.offset = _offset(words)
+        elif key == "CHANNELS" and joint:
+            joint.channels = _channels(words, joint)
+        elif word == "}" and joint:
+            within = joint.parent
         else:
-            raise words.error(f"'{word[:40]}' stands in the hierarchy")
+            raise _misplaced(words, word, joints)
+
+
+def _begun(words: Words, joints: list[_Joint], parent: int) -> _Joint:
+    """A joint below `parent`, read up to its brace."""
+    name = _name(words)
+    length = len(name) + (1 + joints[parent].path_length if parent >= 0 else 0)
+    if length + sum(joint.path_length for joint in joints) > MOST_NAMES:
+        raise words.error(f"has joint paths of more than {MOST_NAMES} characters", "shorten the names")
+    return _Joint(name, parent, length, np.zeros(3))
+
+
+def _read_end(words: Words, joints: list[_Joint], joint: _Joint) -> None:
+    """The offset of a joint's end, a block that holds nothing else."""
+    while words.next() != "{":
+        pass
+    while (word := words.next()) != "}":
+        if word.upper() != "OFFSET":
+            raise _misplaced(words, word, joints)
+        joint.end = _offset(words)
+
+
+def _offset(words: Words) -> np.ndarray:
+    return np.array([words.number() for _ in range(3)])
+
+
+def _channels(words: Words, joint: _Joint) -> tuple[str, ...]:
+    channels = tuple(words.next().lower() for _ in range(words.count(6, "channels")))
+    if len(set(channels)) != len(channels) or not set(channels) <= _CHANNELS:
+        raise words.error(f"joint '{joint.name}' has channels {' '.join(channels)[:80]}")
+    return channels
+
+
+def _misplaced(words: Words, word: str, joints: list[_Joint]) -> NeuralocksError:
+    if word.upper() in ("ROOT", "JOINT"):
+        return words.error(f"joint {len(joints)} stands in a wrong place")
+    return words.error(f"'{word[:40]}' stands in the hierarchy")
 
 
 _CHANNELS = {f"{axis}{kind}" for axis in "xyz" for kind in ("position", "rotation")}
