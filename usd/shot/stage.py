@@ -10,7 +10,6 @@ from pxr import Usd
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
-from neuralocks_core.skinned_body import Body
 
 from ..border.damage import names_damage
 from ..border.placement import Placement
@@ -147,16 +146,8 @@ def read_shot(
     for rig in used:
         if not still:
             _check_animated([rig])
-        body, left = whole_body(rig, every)
-        found = _on(body, rig, found)
-        notes += rig.notes + lies_down(rig) + partial_body(rig, left)
-    notes += without_body(used, every)
-    # Once for all grooms that one joint carries: each reads the whole motion.
-    for attachment in {item.attachment.character: item.attachment for item in found}.values():
-        carrying = replace(attachment.rig, character=attachment.character)
-        if stops := without_turn(carrying):
-            raise NeuralocksError(stops[0])
-        notes += rig_notes(attachment.rig if off_head(attachment) else carrying)
+        found = _on_whole_body(found, rig, every, notes)
+    notes += without_body(used, every) + _notes_on_motion(found)
     first, last = frame_range(stage, used)
     return Shot(
         path=path,
@@ -239,8 +230,12 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
     return found
 
 
-def _on(body: Body | None, rig: StageRig, grooms: list[StageGroom]) -> list[StageGroom]:
-    """The grooms, those of a rig on its characters with this body; grooms that share a character still do."""
+def _on_whole_body(grooms: list[StageGroom], rig: StageRig, every, notes: list[str]) -> list[StageGroom]:
+    """The grooms, those of a rig on its characters with what all skeletons skin of its body, with notes on the rig; grooms that share a
+    character still do.
+    """
+    body, left = whole_body(rig, every)
+    notes += rig.notes + lies_down(rig) + partial_body(rig, left)
     if body is rig.character.body:
         return grooms
     own = {item.attachment.character for item in grooms if item.attachment.rig is rig}
@@ -261,6 +256,21 @@ def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
     still = [item for item in grooms if not item.attachment.rig.source.animated]
     notes += [stands_still(item.path, item.attachment.rig) for item in still]
     return moving
+
+
+def _notes_on_motion(grooms: list[StageGroom]) -> list[str]:
+    """Notes on what carries the grooms, once for all grooms of a joint, because each reads the whole motion.
+
+    Raises:
+        NeuralocksError: a joint that the network reads has no rotation.
+    """
+    notes = []
+    for attachment in {item.attachment.character: item.attachment for item in grooms}.values():
+        carrying = replace(attachment.rig, character=attachment.character)
+        if stops := without_turn(carrying):
+            raise NeuralocksError(stops[0])
+        notes += rig_notes(attachment.rig if off_head(attachment) else carrying)
+    return notes
 
 
 def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tuple[list[StageRig], list[str]]:
