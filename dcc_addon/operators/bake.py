@@ -131,55 +131,72 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
     notes += [f"{hair.name_full}: {doubt}" for hair in hairs if (doubt := imported.doubt(hair))]
     character, label, subframes = armature.name_full, file_label(armature.name), scene.neuralocks.subframes
     yield from loading("usd.baking.bake", "usd.assets.own_layers", "usd.assets.scene_writer")
-    from usd.assets.own_layers import is_own
-    from usd.baking.bake import bake
-
-    free = untaken(Path(full), label, lambda path: any(owner_of(out, character) for out in _outs(path, len(looks))))
-    if free != Path(full):
-        owner = next(filter(None, (owner_of(out, character) for out in _outs(Path(full), len(looks)))))
-        notes.append(f"{full}: it belongs to {owner}, and is kept; this bake is written to {free.name}")
-    outs = _outs(free, len(looks))
-    groups = [(out, *group) for out, group in zip(outs, looks)]
-    for out, _, names in groups:
-        if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
-            raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
-    check_ours([*outs, *map(shot_beside, outs)], is_own)
+    groups, kept = _with_files(looks, Path(full), character, label)
+    notes += kept
+    outs = [out for out, _, _ in groups]
     # If hair has velocities, Cycles blurs it along straight lines, and leaves the samples between the frames unread.
     played = attached or any(attach.players(str(out)) for out in outs)
-    velocities = subframes == 1 or not played
+    options = {"frames": f"{first}:{last}", "subframes": subframes, "velocities": subframes == 1 or not played}
     sampled = yield from sampling(context, named(character), share=0.5)
     notes += [text for name, text in sampled.hairs_off.items() if any(name in names for _, _, names in groups)]
     baked: dict[str, tuple[str, str]] = {}
     written: dict[str, str] = {}
     with undone_on_failure(*outs, *map(shot_beside, outs)):
         for number, (out, look, names) in enumerate(groups):
-            shot = shot_beside(out)
             begin, end = (0.5 + 0.5 * (number + done) / len(looks) for done in (0, 1))
             own = [named(name) for name in names]
-            prims = yield from write_shot(shot, named(character), sampled, own, undrawn, begin, played)
-            job = Threaded(
-                lambda say, shot=shot, out=out, look=look: bake(
-                    shot,
-                    out,
-                    look.model,
-                    frames=f"{first}:{last}",
-                    subframes=subframes,
-                    material=list(look.material),
-                    strength=look.motion,
-                    resolve=look.resolve,
-                    **look.blowing._asdict(),
-                    loop=sampled.clip.loop,
-                    velocities=velocities,
-                    progress=say,
-                )
-            )
-            result = yield from job.steps(begin, end)
+            prims = yield from write_shot(shot_beside(out), named(character), sampled, own, undrawn, begin, played)
+            told = yield from _baking(out, look, begin, end, loop=sampled.clip.loop, **options)
             baked |= {name: (str(out), prims[name]) for name in names}
             written |= prims
-            notes += [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in result.notes]
+            notes += [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in told]
     for out in outs:
         attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()}, scene, (first, last))
     return Baked(baked, list(dict.fromkeys(notes)), written, (first, last))
+
+
+def _with_files(looks, path: Path, character: str, label: str) -> tuple[list[tuple], list[str]]:
+    """The (file to write, look, names) of each look, and the notes: if `path` belongs to something else, files have the `label` in their
+    names.
+
+    Raises:
+        NeuralocksError: hair that is not in the bake plays a file, or we did not make it.
+    """
+    from usd.assets.own_layers import is_own
+
+    free = untaken(path, label, lambda path: any(owner_of(out, character) for out in _outs(path, len(looks))))
+    notes = []
+    if free != path:
+        owner = next(filter(None, (owner_of(out, character) for out in _outs(path, len(looks)))))
+        notes.append(f"{path}: it belongs to {owner}, and is kept; this bake is written to {free.name}")
+    outs = _outs(free, len(looks))
+    groups = [(out, *group) for out, group in zip(outs, looks)]
+    for out, _, names in groups:
+        if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
+            raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
+    check_ours([*outs, *map(shot_beside, outs)], is_own)
+    return groups, notes
+
+
+def _baking(out: Path, look, begin: float, end: float, **options):
+    """Steps, from share `begin` to `end` of the work, of baking the shot beside `out` with the sliders of a look; returns notes."""
+    from usd.baking.bake import bake
+
+    job = Threaded(
+        lambda say: bake(
+            shot_beside(out),
+            out,
+            look.model,
+            material=list(look.material),
+            strength=look.motion,
+            resolve=look.resolve,
+            **look.blowing._asdict(),
+            progress=say,
+            **options,
+        )
+    )
+    result = yield from job.steps(begin, end)
+    return result.notes
 
 
 def _outs(path: Path, count: int) -> list[Path]:
