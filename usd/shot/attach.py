@@ -51,6 +51,7 @@ class Attachment:
         far: distance of the roots from the joint [m], if they are out of its reach and neither a binding nor a skin below says that
             it carries them; otherwise 0.
         drawn: whether the hair begins where its curves are drawn, not at a point before.
+        told: whether a note names the carrying joint.
     """
 
     rig: StageRig
@@ -61,6 +62,7 @@ class Attachment:
     at_default: np.ndarray | None = None
     far: float = 0.0
     drawn: bool = False
+    told: bool = False
 
 
 def attach(
@@ -84,13 +86,15 @@ def attach(
     if rig is not None:
         to_bind = rig.to_bind @ _between_binds(prim, rig, placement) @ geom_bind(prim)
         joint, why, shares, turned = _by_own_binding(prim, rig, to_bind)
-        notes += turned or [*astray(prim, rig, to_bind), *spread_over(rig, path, joint, shares)]
+        spread = [] if turned else spread_over(rig, path, joint, shares)
+        notes += turned or [*astray(prim, rig, to_bind), *spread]
         found = Attachment(
             rig=rig,
             character=carried_by(rig, joint),
             to_bind=to_bind,
             how=f"{why} (its own skel binding)",
             skinned=True,
+            told=bool(spread),
         )
     else:
         seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement, NEAR)) is not None]
@@ -107,6 +111,7 @@ def attach(
     if asked and leaf(name) != leaf(asked):
         option = "--head " if head else "--joint head="
         notes.append(f"{path}: {option}{asked} is not used, the groom is carried by {found.how}")
+        return replace(found, told=True)
     return found
 
 
@@ -177,16 +182,15 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
     joint, why, shares = _by_seat(seat)
     path, to_bind, moved = str(prim.GetPath()), seat.to_bind, moment(prim) is not None
     followed = None if moved else followed_joint(rig, placement)
+    spread = [] if followed or turned else spread_over(rig, path, joint, shares)
     if followed is None:
-        notes += turned or spread_over(rig, path, joint, shares)
         how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
     else:
         joint, to_bind = followed
-        notes += turned
         how = f"joint '{rig.source.names[joint]}' (which its own transform follows)"
-    notes += unsure(prim, seat, placement)
+    notes += [*turned, *spread, *unsure(prim, seat, placement)]
     at_default = ways(rig, mesh, placement)[0] if moved else None
-    return Attachment(rig, carried_by(rig, joint), to_bind, how, False, at_default)
+    return Attachment(rig, carried_by(rig, joint), to_bind, how, False, at_default, told=bool(spread))
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:

@@ -149,17 +149,15 @@ class HairSearch:
         if not self._named and is_lone_guide(prim, self.rigs, placement):
             self._controls.append(path)
             return None
-        told = len(self._notes)
         found = attach(prim, self.rigs, placement, self._head, self._notes)
         if found.far and not self._named:
             self._far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []
         carrying = replace(found.rig, character=found.character)
-        away, joint = off_head(found), leaf(rig_joint(found))
-        # Only a note on the joint itself counts; a blend shape may have its name.
-        if away and not any(found.how in note or f"joint '{joint}'" in note for note in self._notes[told:]):
-            self._off_head.append(f"{path}: rides on '{joint}', not on a head")
+        away = off_head(found)
+        if away and not found.told:
+            self._off_head.append(f"{path}: rides on '{leaf(rig_joint(found))}', not on a head")
         if found.character not in self._of_characters:
             measured = [] if away else untrained(carrying)  # a chest does not have a head's measures
             self._of_characters[found.character] = measured + unevenly_scaled(carrying)
