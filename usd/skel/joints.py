@@ -51,6 +51,7 @@ class JointSource:
         self._stage = prim.GetStage()  # a prim alone does not keep its stage open
         self.notes: list[str] = []
         self.ignored: str | None = None
+        self._told_lengths = False
         skeleton = UsdSkel.Skeleton(prim)
         self.names = _names(skeleton.GetJointsAttr())
         if not self.names:
@@ -289,8 +290,9 @@ class JointSource:
     def _note_lengths(self, time_codes, turns, joints) -> None:
         """Note rotations that UsdSkel would stretch the character by, although they are read as plain ones here."""
         off = np.abs(np.linalg.norm(turns, axis=-1) - 1) > STRETCH
-        if not off.any() or any("of unit length" in note for note in self.notes):
+        if self._told_lengths or not off.any():
             return
+        self._told_lengths = True
         row, column = np.argwhere(off)[0]
         self.notes.append(
             f"{self.animation.GetPath()}: the rotation of joint '{self.names[joints[column]]}' at time code "
