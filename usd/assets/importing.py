@@ -27,12 +27,13 @@ from ..border.units import Border
 from ..shot.curve_ends import beyond_ends
 from ..shot.curves import find_curves, read_groom, widths_attribute, without_points
 from ..shot.groom_notes import groom_notes, no_points
+from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom
 from ..shot.notes import composition_notes, few, first_of, unit_notes, unlikely_head
 from ..shot.other_curves import of_other_kinds
 from ..shot.rig_controls import open_curves
-from ..shot.seat_notes import REVERSED
-from ..shot.stage import read_rigs, read_shot
+from ..shot.skeletons import read_each_rig
+from ..shot.stage import read_rigs
 from ..skel.bind_world import bind_shown
 from ..skel.binding import bound_skeleton, geom_bind
 from ..skel.joints import JointSource
@@ -230,15 +231,18 @@ def _read_usd(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Auth
         found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left), beyond_ends(prim)))
     if not found:
         raise no_groom(stage, source, "give a file with hair curves")
-    return found, notes + _reversed(source, stage) + few(left, "primvars and materials are not imported like that")
+    return found, notes + _reversed(stage, every) + few(left, "primvars and materials are not imported like that")
 
 
-def _reversed(source: Path, stage: Usd.Stage) -> list[str]:
-    """The notes on strands that run from tip to root, if the file has the skin that they grow on."""
-    if not find_skeletons(stage):
-        return []
+def _reversed(stage: Usd.Stage, curves: list[Usd.Prim]) -> list[str]:
+    """The notes on strands that run from tip to root, if the file has the animated character on whose skin they grow."""
     try:
-        return [note for note in read_shot(source).notes if REVERSED in note]
+        rigs, _ = read_each_rig(stage, find_skeletons(stage), Border.of(stage))
+        if not any(rig.source.animated for rig in rigs):
+            return []
+        search = HairSearch(rigs, None, [])
+        found = [search.attachment(prim, Placement(prim)) for prim in search.filled(curves)]
     except NeuralocksError:  # whatever is wrong with its characters, its curves are imported
         check()
         return []
+    return [note for each in found if each is not None for note in each.turned]

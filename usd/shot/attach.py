@@ -5,7 +5,7 @@ In this order: the groom's own skel binding, the joint that the prim's own anima
 the binding of that mesh, the joint named by the user, a joint named like a head.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pxr import Usd, UsdSkel
@@ -52,6 +52,7 @@ class Attachment:
             it carries them; otherwise 0.
         drawn: whether the hair begins where its curves are drawn, not at a point before.
         told: whether a note names the carrying joint.
+        turned: the note on strands that run from tip to root, if they do.
     """
 
     rig: StageRig
@@ -63,6 +64,7 @@ class Attachment:
     far: float = 0.0
     drawn: bool = False
     told: bool = False
+    turned: list[str] = field(default_factory=list)
 
 
 def attach(
@@ -95,6 +97,7 @@ def attach(
             how=f"{why} (its own skel binding)",
             skinned=True,
             told=bool(spread),
+            turned=turned,
         )
     else:
         seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement, NEAR)) is not None]
@@ -102,7 +105,9 @@ def attach(
             found = _on_mesh(prim, seats, placement, notes)
         else:
             found = _by_name(prim, rigs, placement, head)
-            notes += [] if found.far else lies_off_skin(prim, found.rig, placement)
+            if not found.far and (seat := find_seat(prim, found.rig, placement)) is not None:
+                found = replace(found, turned=upside_down(prim, seat.rig, seat.to_bind))
+                notes += found.turned or [lies_off_skin(prim, seat)]
     beyond = beyond_ends(prim)
     found = replace(found, drawn=begins_where_drawn(prim, found.rig, found.to_bind, beyond))
     notes += not_pinned(prim, found.rig, found.drawn, beyond)
@@ -190,7 +195,7 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
         how = f"joint '{rig.source.names[joint]}' (which its own transform follows)"
     notes += [*turned, *spread, *unsure(prim, seat, placement)]
     at_default = ways(rig, mesh, placement)[0] if moved else None
-    return Attachment(rig, carried_by(rig, joint), to_bind, how, False, at_default, told=bool(spread))
+    return Attachment(rig, carried_by(rig, joint), to_bind, how, False, at_default, told=bool(spread), turned=turned)
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:

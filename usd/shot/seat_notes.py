@@ -11,11 +11,9 @@ from neuralocks_core.rotation import inverse, sizes, transformed
 from ..border.placement import Placement
 from ..skel.stage_rig import StageRig
 from .curve_ends import Beyond
-from .seat import NEAR, either_ends, find_seat, off_skin, some_ends, some_places
+from .seat import NEAR, Seat, either_ends, off_skin, some_ends, some_places
 from .ways import CLEARLY
 
-REVERSED = "seem to run from tip to root"
-"""What the note on such strands says."""
 TOUCHES = 0.003
 """Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
 COARSE = 2e-4
@@ -24,16 +22,13 @@ LEVEL = 0.001
 """Points nearer to skin than this [m] are all alike: skins are only as smooth as their triangles."""
 
 
-def lies_off_skin(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
+def lies_off_skin(prim: Usd.Prim, seat: Seat) -> str:
     """The note on hair without a binding that lies off the skin of its carrier."""
-    seat = find_seat(prim, rig, placement)
-    if seat is None:
-        return []
-    return upside_down(prim, rig, seat.to_bind) or [
-        f"{prim.GetPath()}: its roots lie {seat.distance:.2g} m from the skin of {rig.path}"
-        f"{rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
+    return (
+        f"{prim.GetPath()}: its roots lie {seat.distance:.2g} m from the skin of {seat.rig.path}"
+        f"{seat.rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
         "check that it was made for this pose"
-    ]
+    )
 
 
 def astray(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]:
@@ -60,7 +55,7 @@ def upside_down(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]
     if last > NEAR or not first:
         return []
     return [
-        f"{prim.GetPath()}: its strands {REVERSED}: their last points lie on the skin of {rig.path}, "
+        f"{prim.GetPath()}: its strands seem to run from tip to root: their last points lie on the skin of {rig.path}, "
         f"their first ones {first:.2g} m away; reverse the strands"
     ]
 
