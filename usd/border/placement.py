@@ -22,11 +22,12 @@ class Unplaced(NeuralocksError):
 
     Attributes:
         prim: the prim to be placed.
+        fact, remedy: what is wrong, and what to do, in words.
     """
 
-    def __init__(self, prim: Usd.Prim, what: str):
-        super().__init__(f"{prim.GetPath()}: {what}")
-        self.prim = prim
+    def __init__(self, prim: Usd.Prim, fact: str, remedy: str):
+        super().__init__(f"{prim.GetPath()}: {fact}; {remedy}")
+        self.prim, self.fact, self.remedy = prim, fact, remedy
 
 
 class Placement:
@@ -110,7 +111,7 @@ class Placement:
                 code = None if time.IsEarliestTime() else time.GetValue()
                 when = "" if code is None else f" at time code {code:g}"
                 whose = self.whose(wrong, code)
-                raise Unplaced(self.prim, f"{whose}{when} {fact}; {remedy}")
+                raise Unplaced(self.prim, f"{whose}{when} {fact}", remedy)
         return matrix if self.brought is None else self.brought @ matrix
 
 

@@ -127,7 +127,7 @@ class HairSearch:
             if self._named or error.prim != prim or bound_skeleton(prim):
                 raise
             del self._notes[told:]
-            self._far.append(str(error).replace("; ", ", so it is not taken for hair; ", 1))
+            self._far.append(f"{prim.GetPath()}: {error.fact}, so it is not taken for hair; {error.remedy}")
             return None
 
     def _attachment(self, prim: Usd.Prim, placement: Placement) -> Attachment | None:
