@@ -25,6 +25,7 @@ from .model_notes import learned, model_notes
 from .movers import Movers
 from .posing import GroomPoser
 from .procedure import BakeResult, known_notes, read_asked, write_told
+from .samples import write_samples
 
 RECORDED = 12
 """Letters of a model's digest that a bake records."""
@@ -34,11 +35,11 @@ def bake(
     shot,
     out,
     model=None,
+    *,
     grooms=None,
     skeleton: str | None = None,
     head: str | None = None,
     frames=None,
-    *,
     joints: dict[str, str] | None = None,
     subframes: int = 1,
     material=None,
@@ -109,13 +110,17 @@ def bake(
 
     moved = [(each, [item.attachment for item in items]) for each, items in models]
     untrue = {note for each in moved for note in learned(*each)}
-    known = known_notes(shot, codes, loop, (loop or cuts is None) and movers.asked.spec.bins)
+    known = known_notes(shot, codes, loop, (loop or cuts is None) and bool(movers.asked.spec.bins))
     notes = [
         *(note for note in known if note not in untrue),
         *dict.fromkeys(note for each, its in moved for note in model_notes(each, look, its, strength)),
     ]
-    how = {"moved_by": movers.path, "velocities": velocities, "blown": blown is not None, "progress": progress}
-    result = write_told(notes, tell, began, shot, out, codes, poser, inputs | options, facts, **how)
+
+    def write() -> int:
+        how = {"moved_by": movers.path, "velocities": velocities, "blown": blown is not None, "progress": progress}
+        return write_samples(shot, out, codes, poser, inputs | options, facts, **how)
+
+    result = write_told(notes, tell, began, shot, out, codes, write)
     for told, item in zip(result.grooms, shot.grooms, strict=True):
         told["model"] = movers.path(item).stem
     return result

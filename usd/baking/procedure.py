@@ -15,7 +15,6 @@ from ..shot.curves import find_curves
 from ..shot.gaps import hidden
 from ..shot.notes import asked_notes, few, out_of_place
 from ..shot.stage import Shot, check_frames_named, read_shot
-from .samples import write_samples
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,13 @@ def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[
 
 
 def write_told(
-    notes: list[str], tell: Callable[[list[str]], None] | None, began: float, shot: Shot, out: Path, codes, *what, **how
+    notes: list[str],
+    tell: Callable[[list[str]], None] | None,
+    began: float,
+    shot: Shot,
+    out: Path,
+    codes: list[float],
+    write: Callable[[], int],
 ) -> BakeResult:
     """Tell the notes, write the samples, then tell what is wrong with the output's folder.
 
@@ -75,11 +80,12 @@ def write_told(
         notes: those known before.
         tell: as for `bake`.
         began: on the clock of `time.monotonic`.
-        shot, out, codes, what, how: as for `write_samples`.
+        shot, out, codes: as for `write_samples`.
+        write: writes the samples and returns how many frames were taken over.
     """
     say = tell or _unheard
     say(notes)
-    resumed = write_samples(shot, out, codes, *what, **how)
+    resumed = write()
     late = out_of_place(shot.stage, out)
     say(late)
     return BakeResult(out, codes, _described(shot), notes + late, time.monotonic() - began, resumed)

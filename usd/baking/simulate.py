@@ -26,6 +26,7 @@ from ..shot.wind import as_wind, in_core, wind_facts
 from .bake import as_material
 from .placing import GroomPlacer
 from .procedure import BakeResult, known_notes, read_asked, write_told
+from .samples import write_samples
 from .stencils import Stencils
 
 STRANDS = 2000
@@ -37,11 +38,11 @@ STIFFEST_VOLUME = 100.0
 def simulate(
     shot,
     out,
+    *,
     grooms=None,
     skeleton: str | None = None,
     head: str | None = None,
     frames=None,
-    *,
     joints: dict[str, str] | None = None,
     subframes: int = 1,
     material=None,
@@ -81,14 +82,19 @@ def simulate(
     inputs = {"strands": count, "material": asdict(look), "wind": blown and asdict(blown), "codes": codes, **options}
 
     def poser(items: list[StageGroom]) -> _SimulatedPoser:
+        (item,) = items
         how = {"wind": in_core(blown, shot.border), **options, "progress": progress}
-        return _SimulatedPoser(*items, codes, shot.first, look, count, **how)
+        return _SimulatedPoser(item, codes, shot.first, look, count, **how)
 
     facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
     facts |= wind_facts(blown) | given_facts(cuts, joints)
     notes = known_notes(shot, codes, loop, loop or cuts is None)
-    how = {"blown": blown is not None, "progress": progress}
-    return write_told(notes, tell, began, shot, out, codes, poser, inputs, lambda item: facts, **how)
+
+    def write() -> int:
+        how = {"blown": blown is not None, "progress": progress}
+        return write_samples(shot, out, codes, poser, inputs, lambda item: facts, **how)
+
+    return write_told(notes, tell, began, shot, out, codes, write)
 
 
 class _SimulatedPoser:

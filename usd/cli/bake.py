@@ -63,7 +63,7 @@ def bake_command(
 
     with noting_when_cut_short(lambda: _how_to_go_on(out)), progress_bar("baking") as progress:
         result = bake(
-            shot, out, model, groom or None, skeleton, head, frames,
+            shot, out, model, grooms=groom or None, skeleton=skeleton, head=head, frames=frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material, strength=strength,
             wind=vector(wind, "--wind"), gusts=gusts, resolve=resolve, loop=loop, cuts=cut_codes(cuts), velocities=velocities,
             jobs=jobs, tell=note, progress=progress,
@@ -120,7 +120,7 @@ def simulate_command(
 
     with noting_when_cut_short(lambda: _how_to_go_on(out)), progress_bar("simulating") as progress:
         result = simulate(
-            shot, out, groom or None, skeleton, head, frames,
+            shot, out, grooms=groom or None, skeleton=skeleton, head=head, frames=frames,
             joints=pairs(joint, "--joint"), subframes=subframes, material=material,
             wind=vector(wind, "--wind"), gusts=gusts, strands=strands, volume=volume,
             loop=loop, cuts=cut_codes(cuts), tell=note, progress=progress,

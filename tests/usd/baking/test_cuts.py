@@ -143,8 +143,8 @@ def test_each_character_has_the_cuts_of_its_own_bake(shots, tmp_path, model):
     stage = Usd.Stage.Open(str(shots[0]))
     Sdf.CopySpec(stage.GetRootLayer(), "/Hero", stage.GetRootLayer(), "/Twin")
     stage.GetRootLayer().Export(str(tmp_path / "two.usda"))
-    first = bake(tmp_path / "two.usda", tmp_path / "first.usdc", model, ["/Hero"], cuts=[7, 5, 7]).path
-    second = bake(first, tmp_path / "second.usdc", model, ["/Twin"], cuts=np.zeros(0)).path
+    first = bake(tmp_path / "two.usda", tmp_path / "first.usdc", model, grooms=["/Hero"], cuts=[7, 5, 7]).path
+    second = bake(first, tmp_path / "second.usdc", model, grooms=["/Twin"], cuts=np.zeros(0)).path
     rigs = {item.attachment.rig.path: item.attachment.rig for item in read_baked(second).shot.grooms}
     assert rigs["/Hero/Rig"].clip.cuts * 24 == pytest.approx([5, 7])
     assert not len(rigs["/Twin/Rig"].clip.cuts)

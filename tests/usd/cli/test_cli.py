@@ -38,7 +38,9 @@ def test_bake_is_the_python_function(tmp_path, model, capsys):
              "--material", "bend=2x", "--material", "weight=1.2", "--jobs", "2", "--json")  # fmt: skip
     assert status(*words) == 0
     told = json.loads(capsys.readouterr().out)
-    bake(shot, tmp_path / "b.usdc", model, ["/Hero/Hair"], frames="2:6:2", material={"bend": "2x", "weight": 1.2})
+    bake(
+        shot, tmp_path / "b.usdc", model, grooms=["/Hero/Hair"], frames="2:6:2", material={"bend": "2x", "weight": 1.2}
+    )
     assert (tmp_path / "a.usdc").read_bytes() == (tmp_path / "b.usdc").read_bytes()
     assert told["frames"] == [2.0, 4.0, 6.0] and told["grooms"][0]["joint"].endswith("head")
 

@@ -181,7 +181,7 @@ def test_only_what_was_baked_is_measured(tmp_path, model):
     stage = Usd.Stage.Open(str(write_shot(tmp_path)))
     Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Beard")
     stage.GetRootLayer().Save()
-    bake(stage.GetRootLayer().realPath, tmp_path / "hair.usdc", model, ["/Hero/Hair"])
+    bake(stage.GetRootLayer().realPath, tmp_path / "hair.usdc", model, grooms=["/Hero/Hair"])
     card = evaluate(tmp_path / "hair.usdc")
     assert list(card.grooms) == ["/Hero/Hair"]
     assert any("/Hero/Beard" in note for note in card.notes)
