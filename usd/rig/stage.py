@@ -4,6 +4,7 @@
 from dataclasses import dataclass, field, replace
 from glob import escape
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from pxr import Usd, UsdSkel
@@ -60,6 +61,14 @@ class RiggedHair:
     def path(self) -> str:
         """The Skeleton prim."""
         return self.source.path
+
+
+class _Unusable(NamedTuple):
+    """Why the hair of a skeleton cannot be read, and whether it is named like hair."""
+
+    path: str
+    hairy: bool
+    error: NeuralocksError
 
 
 @names_damage
@@ -142,17 +151,18 @@ def read_rigged_hairs(
         except NeuralocksError as error:
             check()  # the error may come from a stop by the user
             bare += [] if source is None else [source]
-            errors.append((str(prim.GetPath()), _is_hairy(prim, model), reworded(error, _with_path(prim, error))))
+            error = reworded(error, _with_path(prim, error))
+            errors.append(_Unusable(str(prim.GetPath()), _is_hairy(prim, model), error))
             continue
         found.append(RiggedHair(stage, border, source, rig))
     # Hair may have its own skeleton besides the body's; the error should not be that the body's has no hair.
-    hairy = [error for error in errors if error[1]]
+    hairy = [each for each in errors if each.hairy]
     if not found:
-        raise (hairy or errors)[0][-1] from None
+        raise (hairy or errors)[0].error from None
     if model is None:
         others = bare if skeleton is None else Others([hair.source for hair in found], stage, head, joints).maybe_same()
         found = _on_whole_bodies(found, others)
-    return found, [of_skeleton(path, error) for path, *_, error in hairy]
+    return found, [of_skeleton(each.path, each.error) for each in hairy]
 
 
 def _on_whole_bodies(found: list[RiggedHair], others: list[StageRig]) -> list[RiggedHair]:
