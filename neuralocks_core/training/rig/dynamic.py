@@ -5,24 +5,22 @@ The network stays a pure function of the boundary history; it learns to give the
 history.
 """
 
-import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
 
 from neuralocks_core.animation.random_motion import random_clip
-from neuralocks_core.model import REMEDIES
 from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
-from neuralocks_core.training.descent import Schedule, descend
-from neuralocks_core.training.muon import muon
+from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments, contact_weight
 from neuralocks_core.training.rig.deepest import LATE, DeepestPoses
 from neuralocks_core.training.rig.energy import RigEnergy
+from neuralocks_core.training.rig.learning import trained
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
@@ -41,8 +39,6 @@ _DEEP = 3.0
 deepest outweigh all those in which it would hang, and it stands out from the head in all of them."""
 _DEEPEST, _DEEPEST_ROOM = 2e-4, 0.012
 """Weight of contact in the poses in which hair lies deepest, and the room kept there [m]."""
-_RATE, _RATE_ON = 3e-3, 5e-4
-"""Largest rate of a training that begins with nothing, and with a model."""
 _POOL = 256
 """Number of bodies held ready, and as many in motion."""
 _HELD, _MOVING, _WORST = 16, 8, 8
@@ -107,8 +103,6 @@ def train_dynamic(
     inputs, wanted = torch.as_tensor(features), torch.as_tensor(turns)
     net = TinyNet(begin.hidden if begin else hidden, held.pool, spec)
     net.normalise(features.reshape(-1, features.shape[-1]))
-    if begin:
-        net.begin_as(begin)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
         clip = torch.as_tensor(rng.integers(0, inputs.shape[0], batch))
@@ -132,26 +126,15 @@ def train_dynamic(
                 result["deepest"] = _DEEPEST * _bounded(deepest.contact(net, _WORST)).mean()
         return result
 
-    began = time.monotonic()
-    rate = _RATE_ON if begin else _RATE
-    schedule = Schedule(minutes=seconds / 60, steps=steps, rate=rate, warm_up=50)
-    for state in descend(muon(net, rate, 0.1), losses, schedule, remedy=REMEDIES["rig"]):
+    def show(state: Descended) -> None:
         far = posed + int((learned - posed) * state.done)
         say(far, 1000, f"error {1e3 * state.losses['place'] ** 0.5:.1f} mm")
-    training = {
-        "method": "dynamic, regression on simulated chains",
-        "steps": state.step,
-        "seconds": round(time.monotonic() - began, 1),
-        "seed": seed,
-        "clips": clips,
-        "clip_seconds": clip_seconds,
-        "batch": batch,
-        "hidden": net.hidden,
-        "material": asdict(material),
-    }
-    model = net.model(rig.chains, training)
-    if keep:
-        keep(model)
+
+    settings = {"seed": seed, "clips": clips, "clip_seconds": clip_seconds, "batch": batch}
+    model = trained(
+        net, losses, seconds=seconds, steps=steps, begin=begin, decay=0.1, chains=rig.chains, material=material,
+        method="dynamic, regression on simulated chains", settings=settings, show=show, keep=keep,
+    )  # fmt: skip
     if report_poses:
         middle = (learned + 1000) // 2
         held_poses, in_motion = within(say, learned, middle), within(say, middle, 1000)

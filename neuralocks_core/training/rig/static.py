@@ -3,21 +3,19 @@
 section 4.4).
 """
 
-import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
 
-from neuralocks_core.model import REMEDIES
 from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
-from neuralocks_core.training.descent import Schedule, descend
-from neuralocks_core.training.muon import muon
+from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
+from neuralocks_core.training.rig.learning import trained
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.report import static_report
 from neuralocks_core.training.threads import threads
@@ -29,8 +27,6 @@ _ROOM = 0.01
 is not exact to the millimetre, so hair goes less deep into the body with this."""
 _COLLISION = 0.3
 """Factor on the body's stiffness."""
-_RATE, _RATE_ON = 3e-3, 5e-4
-"""Largest rate of a training that begins with nothing, and with a model."""
 _LEARNING = 700
 """Thousandths of the work that are learning, by default; the rest is the report."""
 
@@ -73,31 +69,19 @@ def train_static(
     roomy = replace(material, margin=material.margin + _ROOM)
     held = HairOnBodies(rig, roomy, _POOL, rng, spec)
     net = TinyNet(begin.hidden if begin else hidden, held.pool, spec)
-    if begin:
-        net.begin_as(begin)
 
     def losses(done: float) -> dict[str, torch.Tensor]:
         elastic, collision = held.parts(net, batch)
         felt = contact_weight(1.0 if begin else done)
         return {"elastic": elastic.mean(), "collision": felt * _COLLISION * collision.mean()}
 
-    began = time.monotonic()
-    rate = _RATE_ON if begin else _RATE
-    schedule = Schedule(minutes=seconds / 60, steps=steps, rate=rate, warm_up=50)
-    for state in descend(muon(net, rate, 0.0), losses, schedule, remedy=REMEDIES["rig"]):
+    def show(state: Descended) -> None:
         say(int(_LEARNING * state.done), 1000, f"energy {sum(state.losses.values()):.3f} m^2/s^2")
-    training = {
-        "method": "quasi-static, self-supervised",
-        "steps": state.step,
-        "seconds": round(time.monotonic() - began, 1),
-        "seed": seed,
-        "batch": batch,
-        "hidden": net.hidden,
-        "material": asdict(material),
-    }
-    model = net.model(rig.chains, training)
-    if keep:
-        keep(model)
+
+    model = trained(
+        net, losses, seconds=seconds, steps=steps, begin=begin, decay=0.0, chains=rig.chains, material=material,
+        method="quasi-static, self-supervised", settings={"seed": seed, "batch": batch}, show=show, keep=keep,
+    )  # fmt: skip
     if report_poses:
         model.report.update(static_report(model, rig, material, report_poses, seed + 1, within(say, _LEARNING, 1000)))
     return model
