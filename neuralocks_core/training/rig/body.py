@@ -12,6 +12,9 @@ from neuralocks_core.rig.rigging import HairRig
 
 AROUND = 1000
 """Number of body vertices that a simulation collides with."""
+BEYOND = 0.1
+"""They are no farther from the head than this beyond the ends of bones at rest [m]. `HairRig.in_reach` is wider, because it leaves out
+nothing that hair may touch: of so few vertices, more would be far from the hair."""
 
 
 class BodyPatch:
@@ -83,7 +86,7 @@ def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarra
     if body is None:
         return None
     canonical = rig.character.canonical(body.points)
-    reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + 0.1
+    reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + BEYOND
     used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
     near = np.flatnonzero(used)
     if not len(near):
