@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks rig`: train, bake, inspect and export rigged mesh hair."""
 
-import shlex
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -103,7 +101,6 @@ def train(
             head=head,
             skeleton=skeleton,
             joints=pairs(joint, "--joint"),
-            command=shlex.join(["neuralocks", *sys.argv[1:]]),
             early=True,
             tell=note,
             progress=progress,

@@ -4,8 +4,6 @@
 import dataclasses
 import enum
 import math
-import shlex
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from neuralocks_core.flags import flag
 from neuralocks_core.number_words import plain_number
 from neuralocks_core.progress import Progress
 
+from ..border.command_line import command_line
 from ..border.extras import check_training
 
 METHODS = ("rollouts", "selfsupervised")
@@ -118,18 +117,11 @@ def train(
             tell([f"training begins with the shipped model for {kind} hair, which knows such hair best"])
     path = train_strands(
         scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,
-        credits=tuple(credits), command=_command(), keep_work=keep_work, tell=tell, progress=progress,
+        credits=tuple(credits), command=command_line(), keep_work=keep_work, tell=tell, progress=progress,
     )  # fmt: skip
     if tell:
         tell(model.read(path).shortcomings())
     return path
-
-
-def _command() -> str:
-    """The running command line, for the model card; empty if it is not one of ours."""
-    program = Path(sys.argv[0])
-    ours = program.name.startswith("neuralocks") or program.parts[-2:] == ("usd", "__main__.py")
-    return shlex.join(["neuralocks", *sys.argv[1:]]) if ours else ""
 
 
 def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, options) -> Path | None:

@@ -12,6 +12,7 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.shortcomings import shortcomings
 
 from ..border.amounts import check_number
+from ..border.command_line import command_line
 from ..border.extras import check_training
 from .beginning import HIGHEST, LOWEST, Beginning
 from .notes import chain_notes, rigged_notes
@@ -34,7 +35,6 @@ def train_rig(
     head: str | None = None,
     skeleton: str | None = None,
     joints: dict[str, str] | None = None,
-    command: str = "",
     early: bool = False,
     tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
@@ -51,7 +51,6 @@ def train_rig(
         material: fields of `rig.rods.RigMaterial`.
         begin: a model file of the same kind and chains to train on, by default with its own material; `hidden` must be left out.
         chains, head, skeleton, joints: see `read_rigged_hair`.
-        command: for the model card.
         early: also write the model before its report is measured, which takes minutes: whoever stops that has the model.
         tell: called with notes for the user before training, since some may save its minutes, and at the end with what the report
             says against the model.
@@ -97,7 +96,7 @@ def train_rig(
         model.training.update(_card(hair.source.character, model, character.name))
         if former:
             model.training["began with"] = former.card()
-        if command:
+        if command := command_line():
             model.training["command"] = command
         model.save(out)
         written = True

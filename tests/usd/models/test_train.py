@@ -19,7 +19,7 @@ from neuralocks_core.training.rollouts import TrainingScene
 from usd.assets.grow import grow
 from usd.cli.train import one_by_one
 from usd.models.clip_file import read_clip
-from usd.models.train import _command, begins_with, train
+from usd.models.train import begins_with, train
 from usd.models.training_scene import MOST_STRANDS, training_scene
 from usd.shot.stage import read_rigs
 
@@ -29,14 +29,6 @@ from ..shots import HAIR, PARENTS, Recipe, write_shot
 BODY = Path(__file__).parents[3] / "examples/shot/body.usdc"
 SPEC, OTHER = BoundarySpec(), BoundarySpec(bins=(1,) * 30)
 LIKE, STILL, PAPER = RegressionOptions(), RegressionOptions(static=True), SelfSupervisedOptions.paper()
-
-
-@pytest.mark.parametrize("program", ("/usr/bin/neuralocks", "C:/x/neuralocks.exe", "/home/me/usd/__main__.py"))
-def test_the_card_has_the_command_however_it_is_begun(program, monkeypatch):
-    monkeypatch.setattr("sys.argv", [program, "train", "-o", "a b.neuralocks"])
-    assert _command() == "neuralocks train -o 'a b.neuralocks'"
-    monkeypatch.setattr("sys.argv", ["/home/me/my_script.py", "train"])
-    assert _command() == ""
 
 
 def test_left_out_it_is_the_shipped_model_where_that_fits():

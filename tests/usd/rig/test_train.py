@@ -103,14 +103,15 @@ def test_a_model_of_another_network_or_other_chains_is_refused(tmp_path):
         Beginning(model, False, None).check(still.chains)
 
 
-def test_a_card_says_what_training_began_with(tmp_path):
+def test_a_card_says_what_training_began_with(tmp_path, monkeypatch):
     pytest.importorskip("torch")
+    monkeypatch.setattr("sys.argv", ["neuralocks", "made", "so"])
     shot, first, then = (tmp_path / name for name in ("who.usda", "first.neuralocks", "then.neuralocks"))
-    small = {"steps": 2, "dynamic": False, "command": "made so"}
+    small = {"steps": 2, "dynamic": False}
     train_rig(small_shot(shot), first, hidden=4, material={"bend": 0.03, "weight": 2.0}, **small)
     card = train_rig(shot, then, begin=first, material={"weight": 1.5}, **small).training
     assert card["hidden"] == 4 and (card["material"]["bend"], card["material"]["weight"]) == (0.03, 1.5)
-    assert card["began with"].items() >= {"command": "made so", "steps": 2, "seed": 0}.items()
+    assert card["began with"].items() >= {"command": "neuralocks made so", "steps": 2, "seed": 0}.items()
 
 
 @pytest.mark.parametrize("early", [True, False])
@@ -123,11 +124,16 @@ def test_who_stops_while_the_report_is_measured_keeps_the_model(tmp_path, monkey
         raise KeyboardInterrupt
 
     monkeypatch.setattr(f"neuralocks_core.training.rig.{kind}.static_report", stop)
+    monkeypatch.setattr("sys.argv", ["neuralocks", "made", "so"])
     out, told, dynamic = tmp_path / "m.neuralocks", [], kind == "dynamic"
-    small = {"steps": 2, "hidden": 4, "early": early, "command": "made so", "clips": 2 if dynamic else None}
+    small = {"steps": 2, "hidden": 4, "early": early, "clips": 2 if dynamic else None}
     with pytest.raises(KeyboardInterrupt):
         train_rig(small_shot(tmp_path / "who.usda"), out, dynamic=dynamic, tell=told.extend, **small)
     assert out.exists() == early == any("is written, but without its report" in note for note in told)
     if early:
         kept = RigModel.load(out)
-        assert kept.training["command"] == "made so" and kept.training["character"] == "who.usda" and not kept.report
+        assert (
+            kept.training["command"] == "neuralocks made so"
+            and kept.training["character"] == "who.usda"
+            and not kept.report
+        )
