@@ -91,9 +91,9 @@ def train(
 
     from .training_scene import training_scene
 
-    kind = RegressionOptions if method == "rollouts" else SelfSupervisedOptions
-    values = parsed(kind, settings)
-    options = SelfSupervisedOptions.paper(**values) if paper else kind(**values)
+    of_method = RegressionOptions if method == "rollouts" else SelfSupervisedOptions
+    values = parsed(of_method, settings)
+    options = of_method.paper(**values) if paper else of_method(**values)
     check_options(options, rollouts, processes)
     try:
         torch.empty(0, device=options.device)
@@ -105,18 +105,16 @@ def train(
     work = work_folder(out, resume)
     if begin == NOTHING and resume and (work / BEGINNING).exists():
         raise NeuralocksError(f"--begin {NOTHING}: the training in {work} began with a model; resume without --begin")
-    chosen = begin in (None, SHIPPED)
-    begin = begins_with(begin, resume, history.get("spec", BoundarySpec()), options)
+    checked = begins_with(begin, resume, history.get("spec", BoundarySpec()), options)
     scene = training_scene(
         character, grooms, motion, skeleton=skeleton, head=head, joints=joints, seed=options.seed,
         variations=variations, tell=tell, progress=progress, gestures=gestures, **history,
     )  # fmt: skip
-    if begin and chosen:
-        begin = nearest_to_all(scene.grooms)
-        if tell and (kind := model.kind_known(begin)):
-            tell([f"training begins with the shipped model for {kind} hair, which knows such hair best"])
+    suited = nearest_to_all(scene.grooms) if checked and begin in (None, SHIPPED) else None
+    if suited and tell and (hair := model.kind_known(suited)):
+        tell([f"training begins with the shipped model for {hair} hair, which knows such hair best"])
     path = train_strands(
-        scene, out, options, rollouts=rollouts, processes=processes, begin=begin, resume=resume,
+        scene, out, options, rollouts=rollouts, processes=processes, begin=suited or checked, resume=resume,
         credits=tuple(credits), command=command_line(), keep_work=keep_work, tell=tell, progress=progress,
     )  # fmt: skip
     if tell:
