@@ -31,7 +31,7 @@ command = command_of(app)
 Chains = Annotated[
     list[str] | None, typer.Option(help="Name pattern of the first joints of hair chains, such as 'Hair*_1'.")
 ]
-Model = Annotated[Path | None, typer.Argument(help="Model file; the shipped one if left out.")]
+ModelArgument = Annotated[Path | None, typer.Argument(help="Model file; the shipped one if left out.")]
 
 
 @command("train")
@@ -81,10 +81,10 @@ def train(
     from neuralocks_core import model as model_file
     from neuralocks_core.rig.report_text import report_lines
 
-    model_file.named(out)
-    changed = {"bend": bend, "weight": weight, "damping": damping}
     from ..rig.train import train_rig
 
+    model_file.named(out)
+    changed = {"bend": bend, "weight": weight, "damping": damping}
     with progress_bar("training") as progress:
         model = train_rig(
             character,
@@ -202,7 +202,7 @@ def evaluate(
 
 @command("export-c", usd=False)
 def export_c(
-    model: Model = None,
+    model: ModelArgument = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="Header to write.")] = Path("hair.h"),
     prefix: Annotated[str, typer.Option(help="Prefix of all names in the header.")] = "nl_hair",
 ) -> None:
