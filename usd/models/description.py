@@ -6,9 +6,11 @@ import numpy as np
 from neuralocks_core import model as model_file
 from neuralocks_core.boundary import BoundarySampler
 from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.deformation.clumping import CANTILEVER
 from neuralocks_core.errors import about
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.measures import MEASURES
+from neuralocks_core.motion import G
 from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND, K
 from neuralocks_core.runtime import graph_session
 from neuralocks_core.stepped import LONGEST
@@ -129,8 +131,8 @@ SLIDERS = {
     "weight": "in the history, t_k = t - k dt / sqrt(weight), divisions by dt stay; divide what wind adds by weight",
     "motion strength": "a factor of `history`: 0 is each pose as if held, 1 as trained",
     "wind": _WIND,
-    "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = 12.36 bend / length^4 "
-    f"+ 9.81 weight / length; {Material.clumping:g} changes nothing. D is the displacement of each strand, and L the mean of it over "
+    "clumping": f"scales how far a strand strays from its lock, by f = (k0 + {2 * Material.clumping:g} tie) / (k0 + 2 clumping tie), k0 = {CANTILEVER:g} bend / length^4 "
+    f"+ {G:g} weight / length; {Material.clumping:g} changes nothing. D is the displacement of each strand, and L the mean of it over "
     "the `valid` strands with the same `lock`. With vertices 0 and 1 at rest, each vertex follows the one before by an edge: rest edge + what L + f (D - L) adds to "
     'it, scaled to the length that the edge has with D: its rest length, unless the model\'s `output` is "displacement"',
     "a game": _game("(steps + 2) dt / sqrt(weight)"),
