@@ -25,7 +25,7 @@ def main() -> None:
     from neuralocks_core import metrics
     from neuralocks_core.deformation.resolve import Resolver
     from neuralocks_core.strands.strand_set import CLAMPED
-    from usd.baking.movers import Movers
+    from usd.baking.groom_models import GroomModels
     from usd.baking.posing import GroomPoser
     from usd.review.demo import shipped_shot
     from usd.shot.stage import read_shot
@@ -37,7 +37,7 @@ def main() -> None:
     arguments = parser.parse_args()
     shot = read_shot(arguments.shot or shipped_shot())
     item = shot.grooms[0]
-    model = Movers(arguments.model, threads=1).of(item)
+    model = GroomModels(arguments.model, threads=1).of(item)
     rig, character = item.attachment.rig, item.attachment.character
     poser = {name: GroomPoser([item], model, resolve=name == "with") for name in ("without", "with")}
     exact = Resolver(character, poser["with"].strands, rig.clip)

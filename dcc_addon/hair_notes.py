@@ -3,7 +3,7 @@
 
 from neuralocks_core.model import kind_known
 
-from .renewed import NOTE
+from .model_updates import NOTE
 from .scene import cached_strands, imported
 from .scene.attach import has_cache
 from .scene.muting import off_meanwhile

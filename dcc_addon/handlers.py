@@ -6,7 +6,7 @@ from bpy.app.handlers import persistent
 
 from neuralocks_core.errors import NeuralocksError
 
-from . import background, live, renewed
+from . import background, live, model_updates
 from .live_strands import live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
 from .reported import doubt_motions, edited, forget_weights, hair_placed, mark_stale, retry_failed
@@ -63,9 +63,9 @@ def on_update(scene, graph):
     if live.bereft(scene):
         live.update(scene, graph)
     carriers = live.carriers(scene)
+    mark_stale(scene, graph, changed, carriers, switched)
     if not carriers:
         return
-    mark_stale(scene, graph, changed, carriers, switched)
     retry_failed(changed)
     names, placed = {armature.name_full for armature in carriers}, hair_placed(graph)
     doubt_motions(changed, objects.keys(), names, placed)
@@ -81,7 +81,7 @@ def on_load(*_):
     session.clear()
     if bpy.data.filepath:
         session.opened = {scene.name_full: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
-    renewed.compare()
+    model_updates.compare()
     make_comparable(bpy.data.objects)
     own = lively(bpy.data.objects)
     if own.hairs or own.armatures:
@@ -107,7 +107,7 @@ def before_save(target=None, *_):
     says since 4.0 where the file will be.
     """
     blur.end()
-    renewed.remember()
+    model_updates.remember()
     make_comparable(bpy.data.objects)
     for scene in bpy.data.scenes:
         live.show_rest(scene)

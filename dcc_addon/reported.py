@@ -10,6 +10,7 @@ from .edited import touched
 from .live_strands import EDITING, known
 from .scene.carried import bodies_of
 from .scene.keyed import concerns, users_of
+from .scene.lookup import find, in_scene
 from .scene.shapes import follows
 from .session import session
 
@@ -22,9 +23,14 @@ def forget_weights(changed) -> None:
 
 
 def mark_stale(scene, graph, changed, carriers, switched: set[str]) -> None:
-    """Motions are out of date if a body of these armatures was edited, or keys of any action that was not just `switched`."""
+    """Motions are out of date if a body was edited, of these armatures or of those that are sampled for other scenes, or keys of any
+    action that was not just `switched`.
+    """
+    sampled = [thing for name in session.rigs if (thing := find(name)) is not None and in_scene(thing, scene)]
+    if not (carriers or sampled):
+        return
     own = [thing.original for thing in changed]
-    edited = _edits_body(scene, graph, own, carriers)
+    edited = _edits_body(scene, graph, own, {*carriers, *sampled})
     keys = [thing for thing in own if isinstance(thing, bpy.types.Action) and thing.name_full not in switched]
     if not (edited or keys):
         return

@@ -11,9 +11,9 @@ from bpy.props import StringProperty
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..bake_groups import grouped
 from ..live import refresh
 from ..live_strands import show_rest
-from ..looks import grouped
 from ..scene import attach, imported
 from ..scene.carried import hairs_of
 from ..scene.export import write_shot

@@ -61,7 +61,7 @@ def read(mesh_object, armature) -> BodyArrays:
                 else:  # Blender blends the keys as they are, without their groups
                     shapes[block.name] = coordinates(block) - basis
     body = BodyArrays(mesh_object.name_full, points, triangles, groups, weights, shapes)
-    for modifier in _before_armature(mesh_object):
+    for modifier in up_to_armature(mesh_object):
         if modifier.type == "MIRROR" and modifier.show_render:
             body = _mirrored(body, mesh_object, modifier)
     if deformed(mesh_object, armature):
@@ -84,10 +84,10 @@ def left_behind(mesh_object, armature) -> str:
     )
 
 
-def _before_armature(mesh_object) -> list:
-    """Modifiers whose result an armature deforms; all, if no armature does."""
+def up_to_armature(mesh_object) -> list:
+    """Modifiers whose result an armature deforms, and that of the armature; all, if no armature does."""
     types = [modifier.type for modifier in mesh_object.modifiers]
-    return list(mesh_object.modifiers)[: types.index("ARMATURE") if "ARMATURE" in types else None]
+    return list(mesh_object.modifiers)[: types.index("ARMATURE") + 1 if "ARMATURE" in types else None]
 
 
 def _mask(block, groups: tuple[str, ...], weights: np.ndarray, count: int):
@@ -139,8 +139,7 @@ def weighed(mesh_object) -> Iterator[None]:
 
 def _weighed(mesh, groups: tuple[str, ...]) -> Iterator[None]:
     """Put the weights of a mesh into the session, step by step; only if some of them, or the groups, differ from those there."""
-    some = range(0, len(mesh.vertices), max(1, len(mesh.vertices) // PROBES))
-    probe = len(mesh.vertices), groups, tuple((g.group, g.weight) for v in some for g in mesh.vertices[v].groups)
+    probe = _probe(mesh, groups)
     name, edits, rows = mesh.name_full, session.edits, []
     if name in session.weights and session.weights[name][0] == probe:
         return
@@ -149,6 +148,16 @@ def _weighed(mesh, groups: tuple[str, ...]) -> Iterator[None]:
         yield
     if edits == session.edits:  # otherwise they were edited in between and are read again
         session.weights[name] = probe, np.array(rows, float).reshape(-1, 3)
+
+
+def weighed_so(mesh_object) -> tuple:
+    """What changes when the weights of a body do, as far as some of its vertices show it."""
+    return _probe(mesh_object.data, tuple(group.name for group in mesh_object.vertex_groups))
+
+
+def _probe(mesh, groups: tuple[str, ...]) -> tuple:
+    some = range(0, len(mesh.vertices), max(1, len(mesh.vertices) // PROBES))
+    return len(mesh.vertices), groups, tuple((g.group, g.weight) for v in some for g in mesh.vertices[v].groups)
 
 
 def shape_values(mesh_object, graph) -> np.ndarray:

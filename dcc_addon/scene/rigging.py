@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 
 from .actions import HAIR, as_before
-from .animated import animated, strips_of, written
+from .animated import animated, curves_of, strips_of, written
+from .body import up_to_armature, weighed_so
 from .settings import as_set, objects_named, settings_of
 from .shapes import shape
 from .unkeyed import PLACE, value_of
@@ -28,7 +29,8 @@ _ONE = re.compile(r"(?:\[(\d+)\]|\.[wxyz])$")
 def rigging(things) -> int:
     """A number that changes when the setup of one of these objects, or of one that it depends on, changes."""
     others = reached(things)[len(things) :]
-    found = [*map(_object, things), *([*_object(thing), *_modifiers(thing)] for thing in others)]
+    shaping = [_modifiers(thing, up_to_armature(thing)) for thing in things if thing.type == "MESH"]
+    found = [*map(_object, things), *shaping, *([*_object(thing), *_modifiers(thing)] for thing in others)]
     return zlib.crc32(repr(found).encode())
 
 
@@ -40,6 +42,15 @@ def posture(things) -> int:
     others = reached(things)[len(things) :]
     found = [*map(_held, things), *([*_held(thing), *shape(thing)] for thing in others)]
     return zlib.crc32(repr(found).encode())
+
+
+def unreported(body) -> list:
+    """Numbers that change when the shape, the weights or the keyed shape of a body are edited: Blender reports nothing of that where
+    it does not evaluate the body.
+    """
+    keys = body.data.shape_keys
+    curves = curves_of(keys.animation_data) if keys else ()
+    return [*shape(body), *map(_keys, curves), weighed_so(body)]
 
 
 def reached(things) -> list:
@@ -185,10 +196,10 @@ def _constraint(constraint, start: str, moving: set[str]) -> list:
     return [constraint.name, constraint.type, several, *as_set(constraint, still)]
 
 
-def _modifiers(thing) -> list:
-    """Modifiers, without what animation writes."""
+def _modifiers(thing, some=None) -> list:
+    """Modifiers, all or some, without what animation writes."""
     moving, found = animated(thing.animation_data), []
-    for modifier in thing.modifiers:
+    for modifier in thing.modifiers if some is None else some:
         start = f'modifiers["{_quoted(modifier)}"].'
         still = [name for name in settings_of(modifier) if start + name not in moving]
         found += [modifier.name, modifier.type, *as_set(modifier, still)]

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a sampling of a rig's motion depends on, so that one that is out of date is noticed."""
 
+import zlib
+
 import bpy
 
 from ..session import session
+from .animated import animated
 from .carried import bodies_of, hairs_of
 from .clock import rate_of, stretch_of
-from .rigging import posture, reached, rigging
+from .rigging import posture, reached, rigging, unreported
+from .shown import enabled
 
 
 def frames_of(scene) -> tuple[int, int]:
@@ -60,15 +64,22 @@ def rigging_of(armature, scene) -> int:
 
 def posture_of(armature, scene) -> int:
     """A number that changes when unkeyed values pose this armature, or what it depends on, differently; hair bones count as they
-    are without the hair's motion.
+    are without the hair's motion. Also when a body is edited that some view layer leaves out.
     """
-    return posture(_moved_together(armature, scene))
+    bodies = [body for body in bodies_of(armature, scene) if not _always_shown(body, scene)]
+    posed = [posture(_moved_together(armature, scene)), *map(unreported, bodies)]
+    return zlib.crc32(repr(posed).encode())
 
 
 def moved_by(armature, scene) -> frozenset[str]:
     """Names of the objects that move this armature, its hair or its bodies, with itself and the bodies."""
     found = reached(_moved_together(armature, scene))
     return frozenset(thing.name_full for thing in found if thing.type != "CURVES")
+
+
+def _always_shown(body, scene) -> bool:
+    keyed = "hide_viewport" in animated(body.animation_data)
+    return not keyed and all(enabled(body, layer) for layer in scene.view_layers)
 
 
 def _moved_together(armature, scene) -> list:

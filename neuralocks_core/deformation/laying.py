@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.body.going_in import depths_along
+from neuralocks_core.body.entry_depth import depths_along
 from neuralocks_core.body.near_body import PosedBody
 from neuralocks_core.strands.strand_set import CLAMPED
 

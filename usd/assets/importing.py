@@ -18,7 +18,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles.fitting import sized
 from neuralocks_core.progress import Progress, silent, within
 
-from ..baking.followers import Followers
+from ..baking.undrawn_points import UndrawnPoints
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import OTHERS, USD, check_not_input, check_not_over, open_stage
@@ -167,7 +167,7 @@ def _put_on(rig: StageRig, found: list[Authored], resize: bool, say: Progress) -
 def _with_ends(each: Authored, drawn: Groom, scale: float, facing: np.ndarray) -> Groom:
     """All points of curves whose drawn ones are on a head, made `scale` times as large: those beyond the ends go with them."""
     points = np.empty_like(each.groom.points)
-    Followers(each.beyond, each.groom.points, scale * facing.T).put(drawn.points, 0, np.eye(3), None, points)
+    UndrawnPoints(each.beyond, each.groom.points, scale * facing.T).put(drawn.points, 0, np.eye(3), None, points)
     return replace(each.groom, points=points, widths=sized(each.groom.widths, scale))
 
 

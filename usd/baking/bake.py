@@ -21,8 +21,8 @@ from ..border.time_codes import given_cuts
 from ..shot.recorded import given_facts
 from ..shot.stage import StageGroom
 from ..shot.wind import as_wind, in_core, wind_facts
+from .groom_models import GroomModels
 from .model_notes import learned, model_notes
-from .movers import Movers
 from .posing import GroomPoser
 from .procedure import BakeResult, known_notes, read_asked, write_told
 from .samples import write_samples
@@ -87,20 +87,20 @@ def bake(
     resolve, loop, velocities = flag("--resolve", resolve), flag("--loop", loop), flag("--velocities", velocities)
     if jobs is not None:
         check_number("--jobs", jobs, 1, 1024, whole=True)
-    movers = Movers(model, jobs)
+    groom_models = GroomModels(model, jobs)
     look = as_material(material)
     check_number("--strength", strength, 0, 4)
     blown = as_wind(wind, gusts)
-    check_felt(blown is None or movers.asked.feels_wind)
+    check_felt(blown is None or groom_models.asked.feels_wind)
     cuts = given_cuts(cuts, loop)
     shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
     options = {"strength": strength, "resolve": resolve, "loop": loop}
-    models = movers.each(shot.grooms)
+    models = groom_models.each(shot.grooms)
     digests = {item.path: digest_of(each) for each, items in models for item in items}
     inputs = {"models": digests, "material": asdict(look), "wind": blown and asdict(blown)}
 
     def poser(items: list[StageGroom]) -> GroomPoser:
-        return GroomPoser(items, movers.of(items[0]), look, wind=in_core(blown, shot.border), **options)
+        return GroomPoser(items, groom_models.of(items[0]), look, wind=in_core(blown, shot.border), **options)
 
     alike = {"material": asdict(look), **options, "strength": float(strength)}
     alike |= wind_facts(blown) | given_facts(cuts, joints)
@@ -110,19 +110,24 @@ def bake(
 
     moved = [(each, [item.attachment for item in items]) for each, items in models]
     untrue = {note for each in moved for note in learned(*each)}
-    known = known_notes(shot, codes, loop, (loop or cuts is None) and bool(movers.asked.spec.bins))
+    known = known_notes(shot, codes, loop, (loop or cuts is None) and bool(groom_models.asked.spec.bins))
     notes = [
         *(note for note in known if note not in untrue),
         *dict.fromkeys(note for each, its in moved for note in model_notes(each, look, its, strength)),
     ]
 
     def write() -> int:
-        how = {"moved_by": movers.path, "velocities": velocities, "blown": blown is not None, "progress": progress}
+        how = {
+            "moved_by": groom_models.path,
+            "velocities": velocities,
+            "blown": blown is not None,
+            "progress": progress,
+        }
         return write_samples(shot, out, codes, poser, inputs | options, facts, **how)
 
     result = write_told(notes, tell, began, shot, out, codes, write)
     for told, item in zip(result.grooms, shot.grooms, strict=True):
-        told["model"] = movers.path(item).stem
+        told["model"] = groom_models.path(item).stem
     return result
 
 

@@ -15,7 +15,7 @@ from neuralocks_core.strands.strand_set import StrandSet, strands_on
 
 from ..shot.curves import rest_points
 from ..shot.stage import StageGroom
-from .followers import Followers
+from .undrawn_points import UndrawnPoints
 
 BLOCK = 512
 """Strands placed at a time, as many as the runtime infers at a time."""
@@ -35,7 +35,7 @@ class GroomPlacer:
         strands: as the network sees it.
         carriers: one for every PART strands.
         ends: (S + 1,) index of the first drawn point of each strand, and at the end the number of all.
-        followers: moves the points that are not drawn, if there are any.
+        undrawn: moves the points that are not drawn, if there are any.
         same_size: whether every strand has as many points as the network gives it.
         centre: (3,) [m], the head's own place in bind world.
     """
@@ -48,10 +48,10 @@ class GroomPlacer:
         slices = (slice(low, low + PART) for low in range(0, item.groom.strand_count, PART))
         self.carriers = [Carrier(part, self.strands.subset(s)) for part, s in zip(self._parts, slices, strict=True)]
         self.ends = np.concatenate([item.groom.starts, [len(item.groom.points)]])
-        self.followers = None
+        self.undrawn = None
         if item.beyond is not None:
-            self.followers = Followers(item.beyond, rest_points(item.prim), item.attachment.to_bind[:3, :3])
-        self.same_size = self.followers is None and bool((item.groom.counts == self.strands.rest.shape[1]).all())
+            self.undrawn = UndrawnPoints(item.beyond, rest_points(item.prim), item.attachment.to_bind[:3, :3])
+        self.same_size = self.undrawn is None and bool((item.groom.counts == self.strands.rest.shape[1]).all())
         self.centre = character.canonical_to_bind[:3, 3]
         low, high = item.groom.points.min(axis=0), item.groom.points.max(axis=0)
         self._corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
@@ -100,7 +100,7 @@ class Placed:
 
     def __init__(self, placer: GroomPlacer, to_local: np.ndarray, rest: np.ndarray | None, points: np.ndarray):
         self._placer, self._all_rest = placer, rest
-        followed = rest is not None and placer.followers is not None
+        followed = rest is not None and placer.undrawn is not None
         self._rest = rest[placer.item.beyond.hair] if followed else rest
         self._linear = to_local[:3, :3]
         self._placing = Placing.of(to_local, placer.centre)
@@ -117,11 +117,11 @@ class Placed:
         here = slice(placer.ends[strands.start], placer.ends[strands.stop])
         within = slice(strands.start % PART, strands.start % PART + strands.stop - strands.start)
         onto = None if self._rest is None else self._rest[placer.ends[part * PART] :]
-        followers = placer.followers
-        out = self.points[here] if followers is None else np.empty((here.stop - here.start, 3), np.float32)
+        undrawn = placer.undrawn
+        out = self.points[here] if undrawn is None else np.empty((here.stop - here.start, 3), np.float32)
         placer.carriers[part].carry(displacement, out, within, self._placing, onto)
-        if followers is not None:
-            followers.put(out, here.start, self._linear, self._all_rest, self.points)
+        if undrawn is not None:
+            undrawn.put(out, here.start, self._linear, self._all_rest, self.points)
 
 
 def _parts(groom: Groom) -> list[Groom]:

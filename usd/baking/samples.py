@@ -27,12 +27,12 @@ from ..border.stage_files import check_not_over, unsaved, used_files
 from ..border.stopping import stopped
 from ..shot.stage import Shot, StageGroom
 from .batches import batches
+from .frame_uses import Uses
 from .header import write_header
 from .override import OverrideWriter, deliver
 from .sample_layer import SAVE_EVERY, SampleLayer
 from .spool import Spool, fingerprint, program_files, unsaved_digest
 from .stencils import Stencils
-from .uses import Uses
 from .write_behind import WriteBehind
 
 BLOCK = 1 << 16

@@ -61,7 +61,10 @@ def train(
         int | None, typer.Option(help="Simulated motions to learn from; 256 if left out. Dynamic only.")
     ] = None,
     bend: Annotated[
-        float | None, typer.Option(help="Stiffness over line density, in m^4/s^2; 0.01, or as --begin has it.")
+        float | None,
+        typer.Option(
+            "--bend", "--stiffness", help="Stiffness over line density, in m^4/s^2; 0.01, or as --begin has it."
+        ),
     ] = None,
     weight: Annotated[
         float | None, typer.Option(help="Weight as a multiple of gravity; 1, or as --begin has it.")
@@ -106,7 +109,7 @@ def train(
             progress=progress,
         )
     if as_json:
-        print_json({"model": str(out), "training": model.training, "report": model.report})
+        print_json({"path": str(out), "training": model.training, "report": model.report})
     else:
         say(
             f"{out}: {counted(len(model.chains), 'hair joint')} in {counted(len(model.chains.roots), 'chain')}, "
@@ -236,5 +239,5 @@ def inspect(
         return
     say(f"{hair.source.path}: {counted(len(hair.rig.chains), 'hair joint')} in {counted(len(rows), 'chain')}")
     for row in rows:
-        say(f"  {row['name']}: {counted(row['joints'], 'joint')}, {100 * row['length']:.1f} cm")
+        say(f"  {row['name']}: {counted(row['joints'], 'joint')}, {100 * row['length [m]']:.1f} cm")
     note(notes)

@@ -104,7 +104,7 @@ def train_command(
         )  # fmt: skip
     meta = model.read(path).meta
     if as_json:
-        print_json({"model": str(path), "training": meta["training"], "report": meta["report"]})
+        print_json({"path": str(path), "training": meta["training"], "report": meta["report"]})
         return
     say(f"{path}: {meta['training']['steps']:,} steps in {meta['training']['minutes']:g} min")
     say(_reached(meta["report"], all(meta["training"].get(KEPT, []))))

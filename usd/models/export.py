@@ -82,12 +82,12 @@ def _grooms(shot, model, *chosen) -> tuple[Sequence[StageGroom], StrandModel]:
     Raises:
         NeuralocksError: the shot cannot be baked, or different shipped models suit its grooms.
     """
-    from ..baking.movers import Movers
+    from ..baking.groom_models import GroomModels
     from ..shot.stage import read_shot
 
-    movers = Movers(model)
+    groom_models = GroomModels(model)
     grooms = read_shot(shot, *chosen, still=True).grooms
-    (mover, some), *others = movers.each(grooms)
+    (mover, some), *others = groom_models.each(grooms)
     if others:
         raise NeuralocksError(
             f"{some[0].path}, {others[0][1][0].path}: different shipped models suit them; export each with --groom "

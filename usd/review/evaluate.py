@@ -12,7 +12,7 @@ from neuralocks_core.progress import Progress, silent
 
 from ..baking.bake import as_material
 from ..baking.batches import grouped
-from ..baking.movers import Movers
+from ..baking.groom_models import GroomModels
 from ..border.damage import names_damage
 from ..shot.recorded import recorded_material
 from ..shot.stage import StageGroom
@@ -112,10 +112,10 @@ def _numbered(say: Progress, first: int, last: int, count: int) -> Progress:
     return lambda done, total, message="": say(done, total, f"{which} of {count}: {message}")
 
 
-def _models_beside(given) -> Movers | None:
+def _models_beside(given) -> GroomModels | None:
     """The models whose held-pose answers are shown; if none is given, the shipped ones, if there are any."""
     try:
-        return Movers(given)
+        return GroomModels(given)
     except NeuralocksError:
         if given is not None:
             raise

@@ -159,9 +159,7 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
         return []
     spoils += weight_notes(rig) + askew_notes(rig) + outside_notes(rig) + mirrored_notes(rig, chains)
     spoils += left_out_notes(rig, meshes, chains)
-    return [
-        {"name": row["name"], "joints": row["joints"], "length [m]": row["length"]} for row in describe_chains(chains)
-    ]
+    return describe_chains(chains)
 
 
 def _how_baked(rig: StageRig) -> dict:

@@ -270,12 +270,12 @@ def _with_path(prim: Usd.Prim, error: Exception) -> str:
 
 
 def describe_chains(chains: HairChains) -> list[dict]:
-    """Name, number of moving joints and length [m] of every chain."""
+    """Name, number of moving joints and length of every chain."""
     return [
         {
             "name": chains.chain_name(i),
             "joints": int((chains.chain == i).sum()),
-            "length": round(chains.chain_length(i), 5),
+            "length [m]": round(chains.chain_length(i), 5),
         }
         for i in range(len(chains.roots))
     ]

@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 
 from dcc_addon.hair_notes import hair_notes
-from dcc_addon.renewed import NOTE
+from dcc_addon.model_updates import NOTE
 from tests.blender import scenes
 from tests.blender.checks import MODEL, make_live
 

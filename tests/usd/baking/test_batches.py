@@ -13,7 +13,7 @@ import usd.shot.hair_search as hair_search
 import usd.shot.stage as stage_reading
 from neuralocks_core.deformation.resolve import Resolver
 from usd.baking.bake import bake
-from usd.baking.movers import Movers
+from usd.baking.groom_models import GroomModels
 from usd.review.baked import read_baked
 from usd.review.evaluate import evaluate
 from usd.shot.stage import read_shot
@@ -101,8 +101,10 @@ def test_each_is_moved_as_if_it_were_alone(shot, tmp_path, model, monkeypatch, r
 def test_an_interrupted_bake_goes_on(shot, tmp_path, model, monkeypatch, alternating):
     out = tmp_path / "bake.usdc"
     if alternating:  # of A and C together, then B
-        monkeypatch.setattr(Movers, "path", lambda self, item: self.asked.file.path.with_stem(str("B" in item.path)))
-        monkeypatch.setattr(Movers, "of", lambda self, item: self.asked)
+        monkeypatch.setattr(
+            GroomModels, "path", lambda self, item: self.asked.file.path.with_stem(str("B" in item.path))
+        )
+        monkeypatch.setattr(GroomModels, "of", lambda self, item: self.asked)
     whole = bake(shot, out, model).path.read_bytes()
     out.unlink()
 

@@ -108,5 +108,5 @@ def test_what_was_reached_is_told(tmp_path, capsys, monkeypatch):
         ]
     assert status(*words, "--json") == 0
     assert json.loads(capsys.readouterr().out) == {
-        "model": f"{tmp_path}/m.neuralocks", "training": training, "report": report
+        "path": f"{tmp_path}/m.neuralocks", "training": training, "report": report
     }  # fmt: skip

@@ -34,7 +34,7 @@ def test_train_bake_export(tmp_path, joints, dynamic):
     rows = describe_chains(hair.rig.chains)
     assert len(rows) == chains and sum(row["joints"] for row in rows) == moving
     assert min(row["joints"] for row in rows) == 1 and max(row["joints"] for row in rows) == 5
-    assert all(0.05 < row["length"] < 0.4 for row in rows)  # metres
+    assert all(0.05 < row["length [m]"] < 0.4 for row in rows)  # metres
     listed = inspect(tmp_path / "who.usda")["skeletons"][0]["hair chains"]
     assert [(row["name"], row["joints"]) for row in listed] == [(row["name"], row["joints"]) for row in rows]
     model = trained(hair, dynamic)

@@ -193,7 +193,7 @@ def test_the_example_and_its_command_line(tmp_path):
     """Eight chains of four joints; the baked layer has no validation finding."""
     hair = read_rigged_hair(EXAMPLE / "shot.usda")
     rows = describe_chains(hair.rig.chains)
-    assert len(rows) == 8 and all(row["joints"] == 4 and 0.15 < row["length"] < 0.4 for row in rows)
+    assert len(rows) == 8 and all(row["joints"] == 4 and 0.15 < row["length [m]"] < 0.4 for row in rows)
     pytest.importorskip("onnx")
     model = model_for(hair).save(tmp_path / "m.neuralocks")
     command = [sys.executable, "-m", "usd", "rig", "bake", str(EXAMPLE / "shot.usda"), "-o", str(tmp_path / "o.usda")]

@@ -11,7 +11,7 @@ SHORT = 0.01
 """An edge shorter than this share of the distance to the point gives it no direction."""
 
 
-class Followers:
+class UndrawnPoints:
     """Writes the drawn points of a groom, and the points beyond their ends that go with them, to the array of all its points.
 
     Args:

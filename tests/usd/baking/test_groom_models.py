@@ -8,7 +8,7 @@ from pxr import Sdf, Usd
 from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.runtime import StrandModel
-from usd.baking import movers
+from usd.baking import groom_models
 from usd.baking.bake import bake
 from usd.border.stage_files import open_stage
 from usd.models.export import export_model
@@ -39,7 +39,7 @@ def suits(monkeypatch, model, still_model):
             return path
         return still_model if groom.name == HAIR else model
 
-    monkeypatch.setattr(movers, "suited", suited)
+    monkeypatch.setattr(groom_models, "suited", suited)
 
 
 def test_each_groom_moves_by_its_own(shot, tmp_path, suits, model, still_model):
@@ -61,20 +61,20 @@ def test_a_part_of_the_grooms_moves_as_all_do(shot, tmp_path, suits):
 
 
 def test_the_shipped_model_moves_all_where_it_is_named(shot, suits):
-    (used,) = movers.Movers(str(model_file.shipped())).each(read_shot(shot).grooms)
+    (used,) = groom_models.GroomModels(str(model_file.shipped())).each(read_shot(shot).grooms)
     assert used[0].file.path == model_file.shipped() and len(used[1]) == 2
 
 
 def test_a_model_in_memory_moves_all(shot, suits, model):
     loaded = StrandModel.load(model)
-    (used,) = movers.Movers(loaded).each(read_shot(shot).grooms)
+    (used,) = groom_models.GroomModels(loaded).each(read_shot(shot).grooms)
     assert used[0] is loaded and len(used[1]) == 2
 
 
 def test_the_threads_asked_for_are_those_of_a_model_in_memory_too(model):
     loaded = StrandModel.load(model, threads=2)
-    assert movers.Movers(loaded).asked is movers.Movers(loaded, 2).asked is loaded
-    again = movers.Movers(loaded, 1).asked
+    assert groom_models.GroomModels(loaded).asked is groom_models.GroomModels(loaded, 2).asked is loaded
+    again = groom_models.GroomModels(loaded, 1).asked
     assert again.threads == 1 and again.file is loaded.file and loaded.threads == 2
 
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from neuralocks_core.body.going_in import depths_along
+from neuralocks_core.body.entry_depth import depths_along
 
 KNOWN = 0.03
 """Distances are known this far to both sides of the skin [m]."""

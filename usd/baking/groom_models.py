@@ -12,7 +12,7 @@ from neuralocks_core.runtime import StrandModel
 from ..shot.stage import StageGroom
 
 
-class Movers:
+class GroomModels:
     """The models of a shot's grooms, each read once.
 
     Args:
