@@ -9,7 +9,7 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 
 from ..session import session
-from . import as_baked, blur, cached_strands
+from . import as_baked, as_groomed, blur, cached_strands
 from .muting import CACHE as MODIFIER
 from .muting import mute_deformers, off_meanwhile, unmute_deformers
 from .paths import full
@@ -140,6 +140,7 @@ def switch_changed() -> None:
 def detach(hair) -> bool:
     """Remove the cache, and let the hair follow its surface as before; returns whether there was one."""
     blur.detach(hair)
+    as_groomed.forget(hair)
     if not has_cache(hair):  # it may have been removed by hand
         unmute_deformers(hair, REPLACED)
         return False
@@ -197,6 +198,7 @@ def _cache_file(path: str):
 
 
 def _remember(hair, cache, scene, frames: tuple[int, int]) -> None:
+    as_groomed.remember(hair)
     if hair.neuralocks_hair.armature is not None:
         path = _place(cache)
         session.baked[path] = as_baked.remember(cache, hair.neuralocks_hair.armature, scene, frames, path)

@@ -76,6 +76,17 @@ def reached(things) -> list:
     return list(found.values())
 
 
+def hangs(thing) -> list:
+    """How an object hangs on its parent."""
+    found = [thing.parent and thing.parent.name_full, thing.parent_type, thing.parent_bone]
+    return found + [row[:] for row in thing.matrix_parent_inverse]
+
+
+def stands(thing, moving: set[str]) -> list:
+    """An object's own place, without the paths that animation writes, `moving`."""
+    return [getattr(thing, name)[:] for name in (*PLACE, *DELTA) if name not in moving]
+
+
 def _animation(thing) -> list:
     """Animation data of an object, its data and its shape keys."""
     owners = (thing, thing.data, getattr(thing.data, "shape_keys", None))
@@ -83,9 +94,7 @@ def _animation(thing) -> list:
 
 
 def _object(thing) -> list:
-    moving = animated(thing.animation_data)
-    found = [thing.name_full, thing.parent and thing.parent.name_full, thing.parent_type, thing.parent_bone]
-    found += [row[:] for row in thing.matrix_parent_inverse]
+    moving, found = animated(thing.animation_data), [thing.name_full, *hangs(thing)]
     found += [_constraint(c, f'constraints["{_quoted(c)}"].', moving) for c in thing.constraints]
     found += [_numbers(thing, "", moving), *(_animated_by(data) for data in _animation(thing))]
     if thing.pose is not None:
@@ -105,8 +114,12 @@ def _object(thing) -> list:
 
 def _held(thing) -> list:
     moving, live = animated(thing.animation_data, HAIR), as_before(thing)
-    found = [getattr(thing, name)[:] for name in (*PLACE, *DELTA) if name not in moving]
-    found += [_mode(thing, "", moving), _lists(thing, "", moving), *(_read(data) for data in _animation(thing))]
+    found = [
+        *stands(thing, moving),
+        _mode(thing, "", moving),
+        _lists(thing, "", moving),
+        *(_read(data) for data in _animation(thing)),
+    ]
     if thing.pose is not None:
         bones = thing.pose.bones
         found.append(thing.data.pose_position)
