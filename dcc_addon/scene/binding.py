@@ -82,19 +82,35 @@ def carrier(thing, shown):
     moving = armatures_of(thing)
     if not moving or shown in moving:
         return shown
-    deforming = [modifier.object for modifier in thing.modifiers if modifier.type == "ARMATURE" and modifier.object]
-    return [*deforming, *sorted(moving, key=lambda armature: armature.name_full)][0]
+    return [*deforming(thing), *sorted(moving, key=lambda armature: armature.name_full)][0]
 
 
-def carrying_bone(thing, armature) -> str | None:
-    """The bone of an armature that an object rides on as a whole, if there is one."""
+def carrying_bone(thing, armature, seen=()) -> str | None:
+    """The bone of an armature that an object rides on as a whole, if there is one; also on another armature, such as a face's, whose
+    bones follow it.
+    """
     if thing.parent == armature and thing.parent_type == "BONE":
         return thing.parent_bone
-    for constraint in thing.constraints:
+    for constraint in (*thing.constraints, *_of_bones(thing)):
         for target in _targets(constraint) if constraint.type in CARRYING and not constraint.mute else ():
             if target.target == armature and target.subtarget:
                 return target.subtarget
-    return carrying_bone(thing.parent, armature) if thing.parent is not None else None
+    others = [other for other in (thing.parent, *deforming(thing)) if other not in (None, armature, thing, *seen)]
+    return next((bone for other in others if (bone := carrying_bone(other, armature, (*seen, thing)))), None)
+
+
+def deforming(thing) -> list:
+    """The armatures that deform an object."""
+    return [modifier.object for modifier in thing.modifiers if modifier.type == "ARMATURE" and modifier.object]
+
+
+def apart_at_rest(thing, armature) -> bool:
+    """Whether an object rides on another armature that only constraints of bones join to this one: in the rest pose, where these do not
+    count, it stands anywhere.
+    """
+    others = armatures_of(thing) - {armature}
+    joined = (other for other in others if any(armature in _reached(t.target, set()) for t in _bone_targets(other)))
+    return any(armature not in armatures_of(other) for other in joined)
 
 
 def armatures_of(thing) -> set:
@@ -107,11 +123,19 @@ def _reached(thing, seen: set) -> set:
         return set()
     seen.add(thing)
     found = {thing} if thing.type == "ARMATURE" else set()
-    found |= {modifier.object for modifier in thing.modifiers if modifier.type == "ARMATURE" and modifier.object}
+    found |= {*deforming(thing)}
     for constraint in thing.constraints:
         for target in _targets(constraint):
             found |= _reached(target.target, seen)
     return found | _reached(thing.parent, seen)
+
+
+def _of_bones(thing) -> list:
+    return [constraint for bone in (thing.pose.bones if thing.pose else ()) for constraint in bone.constraints]
+
+
+def _bone_targets(thing) -> list:
+    return [target for constraint in _of_bones(thing) for target in _targets(constraint)]
 
 
 def _targets(constraint) -> list:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes under the hair that ride on a bone as a whole, such as a head that is a separate object: only what an armature deforms is
+"""Meshes under the hair that ride on a bone, such as a head that is a separate object, or has a rig of its own: only what an armature deforms is
 its body.
 """
 
@@ -8,7 +8,7 @@ import numpy as np
 from neuralocks_core.rotation import flat, inverse, transformed
 
 from . import curves
-from .binding import carrying_bone
+from .binding import carrying_bone, deforming
 from .body import vertices
 from .shown import in_renders
 
@@ -19,7 +19,7 @@ UNDER = 0.5
 
 
 def find(armature, bodies: list, scene) -> list:
-    """Rendered meshes with faces that ride on a bone of an armature as a whole, and are not among its `bodies`."""
+    """Rendered meshes with faces that ride on a bone of an armature, and are not among its `bodies`."""
     meshes = (o for o in scene.objects if o.type == "MESH" and len(o.data.polygons) and o not in bodies)
     return [o for o in meshes if carrying_bone(o, armature) and in_renders(o, scene)]
 
@@ -28,12 +28,21 @@ def told(armature, parts: list, hairs: list, places: dict) -> tuple[str, ...]:
     """Notes on `parts` that hair of an armature grows on; `places` has the world transforms (4, 4) of all in the rest pose."""
     roots = np.concatenate([np.zeros((0, 3)), *(_roots(hair.data, places[hair.name_full]) for hair in hairs)])
     found = sorted((o for o in parts if _under(o.data, places[o.name_full], roots)), key=lambda o: o.name_full)
-    return tuple(
-        f"{o.name_full}: it rides on the bone '{carrying_bone(o, armature)}' as a whole, so it is not part of the body, and hair is "
-        f"not kept out of it; if it should be, choose it as Body, or take it off the bone with the rig at rest, parent it to "
-        f"{armature.name_full} with Armature Deform, and give that bone's vertex group all its vertices"
-        for o in found
-    )
+    return tuple(_told(o, armature) for o in found)
+
+
+def _told(part, armature) -> str:
+    bone, others = carrying_bone(part, armature), deforming(part)
+    if others:
+        how = f"it is deformed by {others[0].name_full}, which follows the bone '{bone}'"
+        remedy = "choose it as Body, which then goes with that bone as a whole"
+    else:
+        how = f"it rides on the bone '{bone}' as a whole"
+        remedy = (
+            f"choose it as Body, or take it off the bone with the rig at rest, parent it to {armature.name_full} with Armature "
+            "Deform, and give that bone's vertex group all its vertices"
+        )
+    return f"{part.name_full}: {how}, so it is not part of the body, and hair is not kept out of it; if it should be, {remedy}"
 
 
 def _roots(data, place: np.ndarray) -> np.ndarray:

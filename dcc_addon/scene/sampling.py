@@ -21,7 +21,7 @@ from ..session import SampledRig, session
 from . import armature as armature_reader
 from . import body as body_reader
 from . import body_drawn, riding, rigid_parts
-from .binding import bind_places, hidden
+from .binding import apart_at_rest, bind_places, hidden
 from .carried import bodies_of, hairs_of
 from .clock import rate_of, shown_frame
 from .layers import graph_of, layer_of, working_in
@@ -201,6 +201,8 @@ class _Recording:
             joint = carriers.get(other, self._head)
             joints = self._heads if joint == self._head else self._moved(joint)
             own = following.on_joint(places[other], places[""], joints, self._bind[joint])
+            if own is None and other in of_hairs and apart_at_rest(find(other), named(self.name)):
+                own = following.in_first(places[other], joints, self._bind[joint])
             binds[other] = binds[other] if own is None else own
         yield done
         arrays = []

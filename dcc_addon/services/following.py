@@ -25,6 +25,11 @@ def on_joint(places: np.ndarray, objects: np.ndarray, joints: np.ndarray, bind: 
     """
     if _still(places, objects) or not _still(places, joints):
         return None
+    return in_first(places, joints, bind)
+
+
+def in_first(places: np.ndarray, joints: np.ndarray, bind: np.ndarray) -> np.ndarray:
+    """The place (4, 4) in the bind pose of something that stands to a joint as in the first of all frames; arguments as for `on_joint`."""
     return bind @ np.linalg.inv(joints[0]) @ places[0]
 
 

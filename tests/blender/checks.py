@@ -90,6 +90,28 @@ def baked_points(path, prim, frame):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+def body_sampled(rig, body) -> int:
+    """Compares the body of the sampled character with the evaluated mesh; its number of vertices."""
+    from dcc_addon.services.axes import to_core
+    from dcc_addon.session import session
+    from neuralocks_core.rotation import transformed
+
+    scene = bpy.context.scene
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    sampled = session.rigs[rig.name]
+    for frame in (1, 9):
+        scene.frame_set(frame)
+        evaluated = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        drawn = np.array([v.co[:] for v in evaluated.data.vertices])
+        drawn = transformed(transformed(drawn, np.array(evaluated.matrix_world)), to_core())
+        row = sampled.motion.row(frame)
+        ours = sampled.character.posed_body(
+            sampled.clip.joints[row], sampled.clip.shape_at([sampled.clip.times[row]])[0]
+        )
+        assert len(ours) == len(drawn) and np.abs(ours - drawn).max() < 2e-4, (len(ours), len(drawn), frame)
+    return len(drawn)
+
+
 def apart(a, b):
     """Largest difference of two arrays of the same shape."""
     assert a.shape == b.shape

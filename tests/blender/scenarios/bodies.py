@@ -10,11 +10,9 @@ import bpy
 import numpy as np
 
 from dcc_addon.scene import binding
-from dcc_addon.services.axes import to_core
 from dcc_addon.session import session
-from neuralocks_core.rotation import transformed
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, baked_points, make_live, points_at, refused
+from tests.blender.checks import SAME, apart, baked_points, body_sampled, make_live, points_at, refused
 
 
 def body_as_drawn(_folder: Path) -> None:
@@ -37,7 +35,7 @@ def body_as_drawn(_folder: Path) -> None:
     for point in key.data:
         point.co.x *= 1.5
     key.vertex_group, key.value = "upper", 0.8
-    _same(rig, body)
+    body_sampled(rig, body)
 
     bpy.context.view_layer.objects.active = body
     half_of = bmesh.new()
@@ -50,12 +48,12 @@ def body_as_drawn(_folder: Path) -> None:
     mirror = body.modifiers.new("Mirror", "MIRROR")
     while body.modifiers[0] != mirror:
         bpy.ops.object.modifier_move_up(modifier=mirror.name)
-    assert _same(rig, body) > half
+    assert body_sampled(rig, body) > half
     mirror.use_mirror_merge = False
     mirror.mirror_object = bpy.data.objects.new("Middle", None)
     scene.collection.objects.link(mirror.mirror_object)
     mirror.mirror_object.parent, mirror.mirror_object.location = rig, (0.02, 0, 0)
-    assert _same(rig, body) == 2 * half
+    assert body_sampled(rig, body) == 2 * half
     mirror.mirror_object.scale = (1, 1, 0)
     refused(bpy.ops.neuralocks.sample_motion, "'Mirror' mirrors it in 'Middle', and one of both has zero scale")
 
@@ -117,7 +115,7 @@ def absolute_shape_keys(_folder: Path) -> None:
     for frame, time in ((1, 4.0), (9, 27.0), (12, 99.0)):
         keys.eval_time = time
         keys.keyframe_insert("eval_time", frame=frame)
-    _same(rig, body)
+    body_sampled(rig, body)
     sampled = session.rigs["Rig"]
     assert np.allclose(sampled.clip.shape_at([sampled.clip.times[-1]]), [0, 0, 1])
 
@@ -152,7 +150,7 @@ def rigid_bodies(_folder: Path) -> None:
         skull.constraints.clear()
         skull.location = place
         ride()
-        _same(rig, skull)
+        body_sampled(rig, skull)
     skull.constraints.clear()
     constrained("DAMPED_TRACK", "upper_arm.L")
     assert binding.carrying_bone(skull, rig) is None
@@ -205,24 +203,6 @@ def no_faces(folder: Path) -> None:
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "out.usdc")) == {"FINISHED"}
     rig.neuralocks_character.body = empty
     refused(bpy.ops.neuralocks.sample_motion, "Aaa: it has no faces")
-
-
-def _same(rig, body) -> int:
-    """Compares the body of the sampled character with the evaluated mesh; its number of vertices."""
-    scene = bpy.context.scene
-    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
-    sampled = session.rigs[rig.name]
-    for frame in (1, 9):
-        scene.frame_set(frame)
-        evaluated = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        drawn = np.array([v.co[:] for v in evaluated.data.vertices])
-        drawn = transformed(transformed(drawn, np.array(evaluated.matrix_world)), to_core())
-        row = sampled.motion.row(frame)
-        ours = sampled.character.posed_body(
-            sampled.clip.joints[row], sampled.clip.shape_at([sampled.clip.times[row]])[0]
-        )
-        assert len(ours) == len(drawn) and np.abs(ours - drawn).max() < 2e-4, (len(ours), len(drawn), frame)
-    return len(drawn)
 
 
 def hair_on_a_face(folder: Path) -> None:
