@@ -11,7 +11,6 @@ from neuralocks_core.runtime import StrandModel
 from ..shot.attach import Attachment, off_head
 from ..shot.character_notes import untrained
 from ..shot.notes import without_strength
-from ..skel.stage_rig import StageRig
 
 
 def model_notes(
@@ -29,7 +28,7 @@ def learned(model: StrandModel, moved: Iterable[Attachment]) -> list[str]:
     carriers = {each.character: each for each in moved}  # not each groom: they are measured
     found = [each for each in carriers.values() if not off_head(each)]
     known = [each for each in found if model.knows(each.character, each.rig.clip)]
-    return [note for each in known for note in untrained(_with_head(each))]
+    return [note for each in known for note in untrained(each.carrying)]
 
 
 def _unheard(model: StrandModel, material: Material) -> list[str]:
@@ -51,7 +50,7 @@ def _other_bodies(model: StrandModel, moved: Iterable[Attachment]) -> list[str]:
     own = model.file.path in (shipped(), *specialists())
     remedy = "use the shipped model, or train one on this character"
     if own:  # of those whose size no model knows, the shot's notes tell
-        on_heads = {path: each for path, each in on_heads.items() if not untrained(_with_head(each))}
+        on_heads = {path: each for path, each in on_heads.items() if not untrained(each.carrying)}
         remedy = "train one on this character"
     told = {path: model.another_body(each.character, each.rig.clip) for path, each in on_heads.items()}
     return [
@@ -59,8 +58,3 @@ def _other_bodies(model: StrandModel, moved: Iterable[Attachment]) -> list[str]:
         for path, fact in told.items()
         if fact
     ]
-
-
-def _with_head(found: Attachment) -> StageRig:
-    """The rig with the head that carries the hair."""
-    return replace(found.rig, character=found.character)

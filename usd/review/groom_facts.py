@@ -87,11 +87,12 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
     made = recorded(prim)
     if joint:
-        mover = suited(None, found.character, groom)
+        whole = search.on_whole_body(found)
+        mover = suited(None, whole.character, groom)
         joint["shipped model"] = mover.stem
         spoils += groom_notes(prim, groom, border)
         if not made or made.get("model") == digest_of(_loaded(mover))[:RECORDED]:
-            spoils += model_notes(_loaded(mover), Material(), [found])
+            spoils += model_notes(_loaded(mover), Material(), [whole])
     if found:
         spoils += baked_from_others(prim, found, groom)
     baked = {"samples": _samples(prim, border), "baked with": made} if made else {}

@@ -20,7 +20,7 @@ from ..rig.notes import RIG_JOINTS, mirrored_notes, weight_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import check_orients, core_meshes, describe_chains, is_baked, of_bake
 from ..rig.uneven import names_uneven_prims
-from ..shot.character_notes import lies_down, without_body
+from ..shot.character_notes import lies_down, untrained, without_body
 from ..shot.curves import find_curves
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom, no_skeleton
@@ -108,6 +108,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         stops.append(not_animated(rigs[0]))
     search = HairSearch(rigs, head, spoils)
     grooms = facts_of_grooms(search, curves, border, spoils, stops)
+    spoils += [note for each in map(search.on_whole_body, search.on_heads) for note in untrained(each.carrying)]
     spoils += search.off_heads() + without_body(search.carriers, rigs)
     hairy = [rig for rig, skeleton in zip(rigs, skeletons) if skeleton["hair chains"]]
     if hairy and not grooms:

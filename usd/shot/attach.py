@@ -66,6 +66,11 @@ class Attachment:
     told: bool = False
     turned: list[str] = field(default_factory=list)
 
+    @property
+    def carrying(self) -> StageRig:
+        """The skeleton, with the character of the joint that carries the groom."""
+        return replace(self.rig, character=self.character)
+
 
 def attach(
     prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None, notes: list[str]

@@ -14,7 +14,7 @@ from ..border.placement import Placement, Unplaced
 from ..skel.binding import bound_skeleton
 from ..skel.stage_rig import StageRig
 from .attach import Attachment, attach, of_another, off_head, rig_joint
-from .character_notes import unevenly_scaled, untrained
+from .character_notes import unevenly_scaled
 from .curve_ends import undrawn
 from .curves import left_as_they_are, without_points
 from .groom_notes import another_binds, another_carries, far_from_named, no_points, too_far, unusable_skeleton
@@ -24,6 +24,7 @@ from .others import Others
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 from .seat_notes import coarsely_placed
 from .unusable import Unusable, find_unusable, lies_on
+from .whole_body import whole_body
 
 
 class HairSearch:
@@ -40,6 +41,7 @@ class HairSearch:
     Attributes:
         rigs: as given.
         carriers: skeletons that carry what was found.
+        on_heads: one attachment for each character on whose head hair was found.
     """
 
     def __init__(
@@ -64,6 +66,8 @@ class HairSearch:
         self._bound_off: list[tuple[str, str]] = []
         self._of_characters: dict[Character, list[str]] = {}  # notes, made once for all grooms that one joint carries
         self.carriers: list[StageRig] = []
+        self.on_heads: list[Attachment] = []
+        self._whole: dict[Character, Character] = {}
 
     def no_hair(self) -> list[str]:
         """Why curves are not taken for hair: notes if other hair was found; if none was, the first one is the error."""
@@ -130,6 +134,13 @@ class HairSearch:
             self._far.append(f"{prim.GetPath()}: {error.fact}, so it is not taken for hair; {error.remedy}")
             return None
 
+    def on_whole_body(self, found: Attachment) -> Attachment:
+        """The same with the body that all skeletons skin; grooms that share a character still do."""
+        if found.character not in self._whole:
+            body, _ = whole_body(found.rig, self._every)
+            self._whole[found.character] = replace(found.character, body=body)
+        return replace(found, character=self._whole[found.character])
+
     def _attachment(self, prim: Usd.Prim, placement: Placement) -> Attachment | None:
         path, bound = str(prim.GetPath()), bound_skeleton(prim)
         if self._others and (why := self._clearly_of_another(prim, bound, placement)):
@@ -154,13 +165,13 @@ class HairSearch:
             self._far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []
-        carrying = replace(found.rig, character=found.character)
         away = off_head(found)
         if away and not found.told:
             self._off_head.append(f"{path}: rides on '{leaf(rig_joint(found))}', not on a head")
         if found.character not in self._of_characters:
-            measured = [] if away else untrained(carrying)  # a chest does not have a head's measures
-            self._of_characters[found.character] = measured + unevenly_scaled(carrying)
+            self._of_characters[found.character] = unevenly_scaled(found.carrying)
+            if not away:
+                self.on_heads.append(found)
         self._notes += moved_as_open(prim) + undrawn(prim) + left_as_they_are(prim)
         self._notes += self._of_characters[found.character]
         self._notes += coarsely_placed(prim, found.rig, found.character, placement)

@@ -21,7 +21,7 @@ from ..skel.cut_samples import within
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .attach import Attachment, off_head, rig_joint
-from .character_notes import lies_down, without_body
+from .character_notes import lies_down, untrained, without_body
 from .curve_ends import Beyond, groom_between
 from .curves import find_curves
 from .groom_notes import groom_notes, stands_still
@@ -129,10 +129,10 @@ def read_shot(
         _check_animated(rigs)
     check_cuts(cuts, rigs)
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
-    others = None
-    if skeleton is not None and not grooms:
-        others = Others(rigs, stage, head, joints)
-    search = HairSearch(rigs, head, notes, named=bool(grooms), others=others, forced=bool(grooms and skeleton))
+    others = None if skeleton is None else Others(rigs, stage, head, joints)
+    search = HairSearch(
+        rigs, head, notes, named=bool(grooms), others=None if grooms else others, forced=bool(grooms and skeleton)
+    )
     found = _grooms(search, curves, notes)
     no_hair = search.no_hair()
     if not found:
@@ -266,10 +266,10 @@ def _notes_on_motion(grooms: list[StageGroom]) -> list[str]:
     """
     notes = []
     for attachment in {item.attachment.character: item.attachment for item in grooms}.values():
-        carrying = replace(attachment.rig, character=attachment.character)
+        carrying = attachment.carrying
         if stops := without_turn(carrying):
             raise NeuralocksError(stops[0])
-        notes += rig_notes(attachment.rig if off_head(attachment) else carrying)
+        notes += rig_notes(attachment.rig) if off_head(attachment) else untrained(carrying) + rig_notes(carrying)
     return notes
 
 

@@ -44,6 +44,39 @@ def test_hair_moves_as_if_one_skeleton_skinned_all(tmp_path, model, recipe):
     assert not any("body" in note for note in result.notes), result.notes
 
 
+@pytest.mark.parametrize(
+    "named", [{"grooms": [HAIR]}, {"skeleton": "/Hero/Rig"}, {"grooms": [HAIR], "skeleton": "/Hero/Rig"}]
+)
+def test_who_names_hair_or_skeleton_gets_the_same_person(tmp_path, named):
+    path = _apart(tmp_path)
+    every, some = (read_shot(path, **options).grooms[0] for options in ({}, named))
+    body, other = (each.attachment.character.body for each in (every, some))
+    assert other is not None and np.array_equal(body.points, other.points)
+
+
+def test_a_body_is_measured_with_what_all_skeletons_skin(tmp_path):
+    """The skeleton that carries the hair skins only the neck, so that the top of its head would lie below its joint."""
+    path = _apart(tmp_path)
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    Sdf.CopySpec(layer, "/Coat/Skin", layer, "/Hero/Skin")
+    stage = Usd.Stage.Open(layer)
+    skin = UsdGeom.Mesh(stage.GetPrimAtPath("/Hero/Skin"))
+    for relation in skin.GetPrim().GetRelationships():
+        relation.SetTargets([each.ReplacePrefix("/Coat", "/Hero") for each in relation.GetTargets()])
+    points = np.array(skin.GetPointsAttr().Get())
+    corners = np.array(skin.GetFaceVertexIndicesAttr().Get()).reshape(-1, skin.GetFaceVertexCountsAttr().Get()[0])
+    low = points[corners][..., 1].max(axis=1) < np.median(points[:, 1])
+    points[np.setdiff1d(np.arange(len(points)), corners[low])] = points[corners[low][0, 0]]  # a split drops these
+    skin.GetPointsAttr().Set(points)
+    skin.GetFaceVertexIndicesAttr().Set(corners[low].ravel().tolist())
+    skin.GetFaceVertexCountsAttr().Set([corners.shape[1]] * int(low.sum()))
+    layer.Save()
+    whole = write_shot(tmp_path, Recipe(), "whole")
+    for notes in (lambda shot: read_shot(shot).notes, lambda shot: inspect(shot)["spoils"]):
+        wanted, found = ([note for note in notes(shot) if "(trained: " in note] for shot in (whole, path))
+        assert found == wanted
+
+
 def test_a_character_elsewhere_is_another_one(tmp_path):
     path = _apart(tmp_path)
     stage = Usd.Stage.Open(str(path))
