@@ -1,48 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """`neuralocks import`: hair files of other tools as USD grooms, as they are or put on a character's head."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom, Vt
+from pxr import Sdf, UsdGeom, Vt
 
 from neuralocks_core.deformation.freeing import freed
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.files import as_path
 from neuralocks_core.flags import flag
 from neuralocks_core.formats.look import Look
-from neuralocks_core.formats.units import metres_per_unit, upward_axis
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles.fitting import sized
 from neuralocks_core.progress import Progress, silent, within
 
 from ..baking.undrawn_points import UndrawnPoints
-from ..border.damage import names_damage
-from ..border.placement import Placement
-from ..border.stage_files import OTHERS, USD, check_not_input, check_not_over, open_stage
-from ..border.stopping import check
-from ..border.units import Border
-from ..shot.curve_ends import beyond_ends
-from ..shot.curves import find_curves, read_groom, widths_attribute, without_points
-from ..shot.groom_notes import groom_notes, no_points
-from ..shot.hair_search import HairSearch
-from ..shot.lacking import no_groom
-from ..shot.notes import composition_notes, few, first_of, unit_notes, unlikely_head
-from ..shot.other_curves import of_other_kinds
-from ..shot.rig_controls import open_curves
-from ..shot.skeletons import read_each_rig
+from ..border.stage_files import OTHERS, USD, check_not_input, check_not_over
+from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
-from ..skel.bind_world import bind_shown
-from ..skel.binding import bound_skeleton, geom_bind
-from ..skel.joints import JointSource
-from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
-from .beside import Beside, Primvar, read_beside
+from .beside import Beside, Primvar
 from .groom import Authored, Over, write_grooms
 from .grow import Barber
-from .prims import Spline
+from .usd_hair import read_usd
 
 _READ, _LAID = 400, 950
 """Progress, in thousandths of the work, once the files are read and once the hair is on the head and out of the body."""
@@ -99,7 +81,7 @@ def import_groom(
     notes += told
     for number, path in enumerate(sources):
         say((_READ if rig else _LAID) * number // len(sources), 1000, f"reading {path.name}")
-        read, told = _read(path, out, counted, up, rig is not None and unit is None)
+        read, told = _read(path, out, counted, up, rig is not None and unit is None, rig is not None)
         found += read
         notes += told
     if rig:
@@ -123,10 +105,10 @@ def _common_unit(sources: list[Path], sized: bool) -> tuple[float | None, list[s
     return formats.common_unit(sources, sized)
 
 
-def _read(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Authored], list[str]]:
-    """The grooms of a file, and what a user should know; `sized` if a head sizes them."""
+def _read(source: Path, out: Path, unit, up, sized: bool, onto: bool) -> tuple[list[Authored], list[str]]:
+    """The grooms of a file, and what a user should know; `sized` if a head sizes them, `onto` if they are put on one."""
     if source.suffix.lower() in (*USD, *OTHERS):
-        return _read_usd(source, out, unit, up, sized)
+        return read_usd(source, out, unit, up, sized, onto)
     from neuralocks_core import formats
 
     groom, look, notes = formats.read_with_look(source, unit, up)
@@ -182,67 +164,3 @@ def _primvars(look: Look) -> tuple[Primvar, ...]:
             scope = UsdGeom.Tokens.constant if len(values) == 1 else UsdGeom.Tokens.vertex
             found.append(Primvar(name, kind, scope, 1, array.FromNumpy(np.ascontiguousarray(values))))
     return tuple(found)
-
-
-def _places(curves: list[Usd.Prim]) -> Iterator[np.ndarray]:
-    """Where the stage shows curves at rest, each (4, 4): of those bound to a skeleton, skinning ignores the prim's own transform."""
-    known: dict[str, np.ndarray] = {}  # hundreds of prims may be bound to one
-    for prim in curves:
-        path = bound_skeleton(prim)
-        if path is None:
-            yield Placement(prim).reference
-            continue
-        if path not in known:
-            skeleton = prim.GetStage().GetPrimAtPath(path)
-            try:
-                known[path] = bind_shown(JointSource(skeleton))
-            except NeuralocksError:  # whatever is wrong with it, its curves are imported
-                known[path] = Placement(skeleton).reference
-        yield known[path] @ geom_bind(prim)
-
-
-@names_damage
-def _read_usd(source: Path, out: Path, unit, up, sized: bool) -> tuple[list[Authored], list[str]]:
-    stage = open_stage(source)
-    check_not_input(out, stage)
-    border = Border.of(stage)
-    metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
-    border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
-    found, notes, left = [], composition_notes(stage, source), []
-    notes += [] if sized or unit is not None else unit_notes(stage, source)
-    every = find_curves(stage)
-    hair = open_curves(every)
-    closed, empty = [prim for prim in every if prim not in hair], without_points(hair)
-    notes += few(
-        [
-            f"{prim.GetPath()}: its curves are closed, as a rig's controls are; left out: set their wrap to pinned if they are hair"
-            for prim in closed
-        ]
-    )
-    notes += few([no_points(str(prim.GetPath())) for prim in empty]) + few(of_other_kinds(stage))
-    filled = [prim for prim in hair if prim not in empty]
-    for prim, place in zip(filled, _places(filled), strict=True):
-        curves = UsdGeom.BasisCurves(prim)
-        groom = read_groom(prim, border.to_core @ place, notes)
-        notes += [] if sized else groom_notes(prim, groom, border)
-        if widths_attribute(curves).ValueMightBeTimeVarying():
-            notes.append(f"{prim.GetPath()}: its widths change over time; the first ones are imported")
-        tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
-        found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left), beyond_ends(prim)))
-    if not found:
-        raise no_groom(stage, source, "give a file with hair curves")
-    return found, notes + _reversed(stage, every) + few(left, "primvars and materials are not imported like that")
-
-
-def _reversed(stage: Usd.Stage, curves: list[Usd.Prim]) -> list[str]:
-    """The notes on strands that run from tip to root, if the file has the animated character on whose skin they grow."""
-    try:
-        rigs, _ = read_each_rig(stage, find_skeletons(stage), Border.of(stage))
-        if not any(rig.source.animated for rig in rigs):
-            return []
-        search = HairSearch(rigs, None, [])
-        found = [search.attachment(prim, Placement(prim)) for prim in search.filled(curves)]
-    except NeuralocksError:  # whatever is wrong with its characters, its curves are imported
-        check()
-        return []
-    return [note for each in found if each is not None for note in each.turned]
