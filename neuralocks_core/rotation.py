@@ -108,6 +108,16 @@ def transformed(points: np.ndarray, transform: np.ndarray) -> np.ndarray:
     return np.asarray(points, float) @ transform[:3, :3].T + transform[:3, 3]
 
 
+def strayed(path: np.ndarray, carrier: np.ndarray) -> float:
+    """The largest distance of a path (T, 3) from where its first point would go with a carrier, transforms (T, 4, 4); infinite if that
+    is flat at first.
+    """
+    if flat(carrier[0, :3, :3]):
+        return np.inf
+    first = transformed(path[0], np.linalg.inv(carrier[0]))
+    return float(np.linalg.norm(path - (carrier[:, :3, :3] @ first + carrier[:, :3, 3]), axis=-1).max())
+
+
 def inverse(transform: np.ndarray) -> np.ndarray:
     """Inverse (4, 4) of one affine transform (4, 4), written out.
 

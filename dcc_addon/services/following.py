@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from neuralocks_core.rotation import transformed
+from neuralocks_core.rotation import strayed
 
 from .motion import KEPT_TO, TOLERANCE
 
@@ -57,10 +57,8 @@ def strays(path: np.ndarray, carriers: Sequence[np.ndarray]) -> float:
     """The largest distance of a path (T, 3) from where the carrier that it follows most closely would take its first point;
     carriers are world transforms (T, 4, 4).
     """
-    able = [carrier for carrier in carriers if np.linalg.det(carrier[0])]  # without those hidden by a scale of zero
-    firsts = [transformed(path[0], np.linalg.inv(carrier[0])) for carrier in able]
-    off = [path - (way[:, :3, :3] @ first + way[:, :3, 3]) for way, first in zip(able, firsts)]
-    return min((float(np.linalg.norm(each, axis=-1).max()) for each in off), default=0.0)
+    off = [strayed(path, carrier) for carrier in carriers]
+    return min((each for each in off if each < np.inf), default=0.0)  # without those hidden by a scale of zero
 
 
 def _still(places: np.ndarray, carriers: np.ndarray) -> bool:

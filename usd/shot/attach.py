@@ -24,7 +24,7 @@ from .carrying import carried_by, carrying_joint, followed_joint, head_by_name, 
 from .curve_ends import beyond_ends, ends
 from .curves import moment, rest_points
 from .seat import NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure
-from .seat_notes import astray, lies_off_skin, not_pinned, upside_down
+from .seat_notes import astray, lies_off_skin, not_pinned, strays, upside_down
 from .ways import CLEARLY, ways
 
 ON_HEAD = 0.3
@@ -113,6 +113,8 @@ def attach(
             if not found.far and (seat := find_seat(prim, found.rig, placement)) is not None:
                 found = replace(found, turned=upside_down(prim, seat.rig, seat.to_bind))
                 notes += found.turned or [lies_off_skin(prim, seat)]
+        if not found.far:
+            notes += strays(prim, found.carrying, placement)
     beyond = beyond_ends(prim)
     found = replace(found, drawn=begins_where_drawn(prim, found.rig, found.to_bind, beyond))
     notes += not_pinned(prim, found.rig, found.drawn, beyond)

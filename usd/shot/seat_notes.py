@@ -4,16 +4,19 @@
 import numpy as np
 from pxr import Usd
 
+from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.root_skin import ASTRAY
-from neuralocks_core.rotation import inverse, sizes, transformed
+from neuralocks_core.rotation import inverse, sizes, strayed, transformed
 
 from ..border.placement import Placement
 from ..skel.stage_rig import StageRig
 from .curve_ends import Beyond
 from .seat import NEAR, Seat, either_ends, off_skin, some_ends, some_places
-from .ways import CLEARLY
+from .ways import CLEARLY, SOME_TIMES
 
+STRAYS = 0.01
+"""Less motion of hair relative to what carries it [m] is not told."""
 TOUCHES = 0.003
 """Points this near to skin [m], in the median, grow out of it or are pressed onto it."""
 COARSE = 2e-4
@@ -29,6 +32,28 @@ def lies_off_skin(prim: Usd.Prim, seat: Seat) -> str:
         f"{seat.rig.border.foreign(prim.GetAttribute('points'))} and keep that distance; "
         "check that it was made for this pose"
     )
+
+
+def strays(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
+    """The note on hair without a binding whose own transform nearly keeps to the carrying joint, but moves relative to it, as on a
+    jaw that another skeleton moves.
+    """
+    if not placement.samples or not rig.source.animated:
+        return []
+    times, core = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)], rig.border.to_core
+    middle = some_ends(prim).mean(axis=0)
+    path = np.stack([transformed(middle, core @ placement.at(time)) for time in times])
+    far = strayed(path, np.stack([rig.carrying_at(time) for time in times]))
+    if not STRAYS < far < np.inf:
+        return []
+    with_all = strayed(path, np.stack([core @ rig.source.placement.at(time) for time in times]))
+    if CLEARLY * far >= with_all:
+        return []
+    joint = leaf(rig.source.names[rig.character.carrying_joint])
+    return [
+        f"{prim.GetPath()}: its own transform moves it by up to {1e3 * far:.0f} mm relative to joint '{joint}' of {rig.path}, which "
+        "carries it; a bake does not follow that: bind it to the joint that it should follow"
+    ]
 
 
 def astray(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> list[str]:

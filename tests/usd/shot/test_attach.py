@@ -88,6 +88,23 @@ def test_hair_goes_with_the_joint_that_its_own_transform_follows(tmp_path, model
         assert np.abs(found - (roots[0] @ way[:3, :3].T + way[:3, 3])).max() < 1e-5
 
 
+@pytest.mark.parametrize(("unit", "moved"), [(1, 0.03), (0.01, 0.03), (1, 0.005)])
+def test_hair_that_moves_relative_to_its_head_is_told(tmp_path, unit, moved):
+    """As a beard on a jaw that another skeleton moves."""
+    path = write_shot(tmp_path, Recipe(bound="mesh", unit=unit))
+    rig, stage = read_shot(path).rigs[0], Usd.Stage.Open(str(path))
+    op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddTransformOp()
+    began = np.linalg.inv(rig.joints_at(1)[HEAD])
+    for frame in range(1, 10):
+        way = rig.joints_at(frame)[HEAD] @ began
+        way[:3, 3] += moved * (frame - 1) / 8 * way[:3, 1]
+        way[:3, 3] /= unit
+        op.Set(Gf.Matrix4d(way.T.tolist()), frame)
+    stage.Save()
+    told = "/Hero/Hair: its own transform moves it by up to 30 mm relative to joint 'head' of /Hero/Rig, which carries it"
+    assert [told in note for note in read_shot(path).notes if "its own transform" in note] == [True] * (moved > 0.01)
+
+
 def test_each_groom_finds_its_own_character(tmp_path):
     write_shot(tmp_path, Recipe(bound="mesh"), "asset")
     stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
