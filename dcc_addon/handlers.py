@@ -9,7 +9,7 @@ from neuralocks_core.errors import NeuralocksError
 from . import background, live, model_updates
 from .live_strands import live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
-from .reported import doubt_motions, edited, forget_weights, hair_placed, mark_stale, retry_failed
+from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
 from .scene import blur
 from .scene.appended import remake
 from .scene.attach import switch_changed
@@ -57,13 +57,13 @@ def on_update(scene, graph):
     live.forget_gone()
     changed = [update.id for update in graph.updates]
     objects = {thing.name_full: thing.original for thing in changed if isinstance(thing, bpy.types.Object)}
-    forget_weights(changed)
+    forget_data(changed)
     make_comparable(objects.values())  # a library may have been reloaded
     show_rest_left(objects.values())
     if live.bereft(scene):
         live.update(scene, graph)
     carriers = live.carriers(scene)
-    mark_stale(scene, graph, changed, carriers, switched)
+    mark_stale(graph, changed, carriers, switched)
     if not carriers:
         return
     retry_failed(changed)

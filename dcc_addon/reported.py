@@ -8,31 +8,29 @@ import bpy
 from . import background
 from .edited import touched
 from .live_strands import EDITING, known
-from .scene.carried import bodies_of
 from .scene.keyed import concerns, users_of
-from .scene.lookup import find, in_scene
+from .scene.lookup import find
 from .scene.shapes import follows
 from .session import session
 
 
-def forget_weights(changed) -> None:
-    """Weights of meshes that were edited are read again."""
+def forget_data(changed) -> None:
+    """Weights of meshes, and points of grooms, that were edited are read again."""
     for thing in changed:
         if isinstance(thing, bpy.types.Mesh):
             session.weights.pop(thing.name_full, None)
+        elif isinstance(thing, bpy.types.ID) and thing.id_type == "CURVES":
+            session.grooms.pop(thing.name_full, None)
 
 
-def mark_stale(scene, graph, changed, carriers, switched: set[str]) -> None:
-    """Motions are out of date if a body was edited, of these armatures or of those that are sampled for other scenes, or keys of any
-    action that was not just `switched`.
+def mark_stale(graph, changed, carriers, switched: set[str]) -> None:
+    """Motions are out of date if a body was edited, whichever scene shows it, or keys of any action that was not just `switched`; they
+    are wanted of these armatures.
     """
-    sampled = [thing for name in session.rigs if (thing := find(name)) is not None and in_scene(thing, scene)]
-    if not (carriers or sampled):
-        return
     own = [thing.original for thing in changed]
-    edited = _edits_body(scene, graph, own, {*carriers, *sampled})
+    edited = _edits_body(graph, own)
     keys = [thing for thing in own if isinstance(thing, bpy.types.Action) and thing.name_full not in switched]
-    if not (edited or keys):
+    if not (edited or keys) or not (carriers or session.rigs):
         return
     users = [] if edited else users_of(keys)
     found = [rig for rig in session.rigs.values() if not users or any(concerns(each, rig.moved_by) for each in users)]
@@ -74,12 +72,12 @@ def edited(thing) -> bool:
     return thing.mode in EDITING or not known(thing) or touched(thing)
 
 
-def _edits_body(scene, graph, own: list, carriers) -> bool:
-    """Whether an update, of these data blocks of the file, edits a body by more than what its shape keys read."""
-    updates = (update for update in graph.updates if isinstance(update.id, bpy.types.Mesh))
-    meshes = {update.id.name_full for update in updates if update.is_updated_geometry}
-    bodies = [body.data for armature in carriers for body in bodies_of(armature, scene)] if meshes else ()
-    return any(mesh.name_full in meshes and not follows(mesh, own) for mesh in bodies)
+def _edits_body(graph, own: list) -> bool:
+    """Whether an update, of these data blocks of the file, edits a sampled body by more than what its shape keys read."""
+    edited = {u.id.name_full for u in graph.updates if isinstance(u.id, bpy.types.Mesh) and u.is_updated_geometry}
+    names = {name for rig in session.rigs.values() for name in rig.bodies} if edited else ()
+    bodies = {body.data for name in names if (body := find(name)) is not None and body.data.name_full in edited}
+    return any(not follows(mesh, own) for mesh in bodies)
 
 
 def _is_live(thing) -> bool:

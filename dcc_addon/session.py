@@ -57,6 +57,8 @@ class SampledRig:
     """The setup that moves the rig; see `scene.sampled_from.rigging_of`."""
     posture: int = 0
     """The unkeyed pose; see `scene.sampled_from.posture_of`."""
+    unreported: dict[str, int] = field(default_factory=dict)
+    """Numbers of what Blender may not report of the bodies, by name; see `scene.rigging.unreported`."""
     moved_by: frozenset[str] = frozenset()
     """Names of the objects that moved it; see `scene.sampled_from.moved_by`."""
 
@@ -118,6 +120,8 @@ class Session:
     models: dict[str, tuple[tuple, StrandModel]] = field(default_factory=dict)
     weights: dict[str, tuple[tuple, np.ndarray]] = field(default_factory=dict)
     """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
+    grooms: dict[str, int] = field(default_factory=dict)
+    """A number of the rest points of each groom that plays a cache, by the name of its Curves; dropped when these are edited."""
     vertices: dict[str, int] = field(default_factory=dict)
     """A number of the vertices of each body mesh as they were read last, by mesh name."""
     messages: dict[str, str] = field(default_factory=dict)
@@ -164,6 +168,7 @@ class Session:
         self.written.clear()
         self.stop_preparing_all()
         self.weights.clear()
+        self.grooms.clear()
         self.chains.clear()
 
     def forget(self, name: str) -> None:

@@ -7,6 +7,7 @@ import zlib
 
 from ..services.sliders import SLIDERS
 from ..services.wind import Blowing
+from ..session import session
 from .animated import animated
 from .curves import points
 from .rigging import hangs, stands
@@ -42,4 +43,11 @@ def _numbers(hair) -> list[str]:
     air = own.armature and own.armature.neuralocks_character
     blown = Blowing.of(air.wind, air.wind_direction, air.gusts) if air else Blowing()
     found = [*hangs(hair), *stands(hair, moving)], [*set_so, own.resolve, own.model], blown
-    return [f"{zlib.crc32(each):08x}" for each in (points(hair.data), *(repr(each).encode() for each in found))]
+    return [f"{number:08x}" for number in (_number_of(hair.data), *(zlib.crc32(repr(each).encode()) for each in found))]
+
+
+def _number_of(data) -> int:
+    """A number of the points at rest. The panel asks in every redraw, and a large groom takes longer to read than that may take."""
+    if data.name_full not in session.grooms:
+        session.grooms[data.name_full] = zlib.crc32(points(data))
+    return session.grooms[data.name_full]

@@ -85,18 +85,30 @@ def carrier(thing, shown):
     return [*deforming(thing), *sorted(moving, key=lambda armature: armature.name_full)][0]
 
 
-def carrying_bone(thing, armature, seen=()) -> str | None:
-    """The bone of an armature that an object rides on as a whole, if there is one; also on another armature, such as a face's, whose
-    bones follow it.
-    """
+def carrying_bone(thing, armature) -> str | None:
+    """The bone of an armature that an object rides on as a whole, if there is one."""
     if thing.parent == armature and thing.parent_type == "BONE":
         return thing.parent_bone
-    for constraint in (*thing.constraints, *_of_bones(thing)):
+    if (bone := _followed(thing, armature)) is not None:
+        return bone
+    return carrying_bone(thing.parent, armature) if thing.parent is not None else None
+
+
+def followers(other, armature) -> dict[str, str]:
+    """Which bone of an armature each bone of another one follows, by name, as a face's root follows a head; those of bones below one
+    are not among them.
+    """
+    bones = other.pose.bones if other != armature and other.pose else ()
+    return {bone.name: to for bone in bones if bone.constraints and (to := _followed(bone, armature)) is not None}
+
+
+def _followed(thing, armature) -> str | None:
+    """The bone of an armature that the constraints of an object, or of another's bone, follow."""
+    for constraint in thing.constraints:
         for target in _targets(constraint) if constraint.type in CARRYING and not constraint.mute else ():
             if target.target == armature and target.subtarget:
                 return target.subtarget
-    others = [other for other in (thing.parent, *deforming(thing)) if other not in (None, armature, thing, *seen)]
-    return next((bone for other in others if (bone := carrying_bone(other, armature, (*seen, thing)))), None)
+    return None
 
 
 def deforming(thing) -> list:
@@ -105,8 +117,8 @@ def deforming(thing) -> list:
 
 
 def apart_at_rest(thing, armature) -> bool:
-    """Whether an object rides on another armature that only constraints of bones join to this one: in the rest pose, where these do not
-    count, it stands anywhere.
+    """Whether an object rides on another armature that only constraints of its bones join to this one: these do not count in the rest
+    pose, so its place there means nothing.
     """
     others = armatures_of(thing) - {armature}
     joined = (other for other in others if any(armature in _reached(t.target, set()) for t in _bone_targets(other)))
@@ -130,12 +142,9 @@ def _reached(thing, seen: set) -> set:
     return found | _reached(thing.parent, seen)
 
 
-def _of_bones(thing) -> list:
-    return [constraint for bone in (thing.pose.bones if thing.pose else ()) for constraint in bone.constraints]
-
-
-def _bone_targets(thing) -> list:
-    return [target for constraint in _of_bones(thing) for target in _targets(constraint)]
+def _bone_targets(armature) -> list:
+    constraints = (constraint for bone in armature.pose.bones for constraint in bone.constraints)
+    return [target for constraint in constraints for target in _targets(constraint)]
 
 
 def _targets(constraint) -> list:

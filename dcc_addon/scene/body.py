@@ -15,7 +15,7 @@ from ..services.mirror import mirrored
 from ..services.rig import BodyArrays
 from ..session import session
 from .armature import matrix
-from .binding import carrier, carrying_bone
+from .binding import carrier, carrying_bone, deforming, followers
 from .shown import in_renders
 from .skinned import deformed, moving_groups
 
@@ -66,15 +66,35 @@ def read(mesh_object, armature) -> BodyArrays:
             body = _mirrored(body, mesh_object, modifier)
     if deformed(mesh_object, armature):
         return replace(body, groups=moving_groups(mesh_object, armature))
-    if (bone := carrying_bone(mesh_object, armature)) is not None:
+    if (bone := _rigid_on(mesh_object, armature)) is not None:
         rigid = np.array([[i, 0, 1] for i in range(len(body.points))], float)
         return replace(body, groups=(bone,), weights=rigid)
     return body
 
 
+def followed_bone(mesh_object, armature) -> str | None:
+    """The bone of an armature that everything follows which deforms a mesh of another rig, as a face's head joint; None if that is not
+    one bone.
+    """
+    for other in deforming(mesh_object):
+        known = followers(other, armature)
+        moving = [other.data.bones[name] for name in moving_groups(mesh_object, other) if name] if known else []
+        ways = [[each.name for each in (bone, *bone.parent_recursive) if each.name in known] for bone in moving]
+        found = {known[way[0]] if way else None for way in ways}
+        if len(found) == 1 and None not in found:
+            return found.pop()
+    return None
+
+
+def _rigid_on(mesh_object, armature) -> str | None:
+    """The bone that carries a mesh as a whole; of another rig's mesh, only if none of its groups are this one's."""
+    bone = carrying_bone(mesh_object, armature)
+    return bone if bone or any(moving_groups(mesh_object, armature)) else followed_bone(mesh_object, armature)
+
+
 def left_behind(mesh_object, armature) -> str:
     """The note on a body that no bone of this armature moves, since it stays with the first bone; empty if one does."""
-    if any(moving_groups(mesh_object, armature)) or carrying_bone(mesh_object, armature) is not None:
+    if any(moving_groups(mesh_object, armature)) or _rigid_on(mesh_object, armature) is not None:
         return ""
     moving = carrier(mesh_object, None)
     remedy = f"choose {moving.name_full} as the character" if moving not in (None, armature) else "choose another body"

@@ -44,13 +44,14 @@ def posture(things) -> int:
     return zlib.crc32(repr(found).encode())
 
 
-def unreported(body) -> list:
-    """Numbers that change when the shape, the weights or the keyed shape of a body are edited: Blender reports nothing of that where
+def unreported(body) -> int:
+    """A number that changes when the shape, the weights or the keyed shape of a body are edited: Blender reports nothing of that where
     it does not evaluate the body.
     """
     keys = body.data.shape_keys
     curves = curves_of(keys.animation_data) if keys else ()
-    return [*shape(body), *map(_keys, curves), weighed_so(body)]
+    found = [*shape(body), *((curve.data_path, _points(curve)) for curve in curves), weighed_so(body)]
+    return zlib.crc32(repr(found).encode())
 
 
 def reached(things) -> list:
@@ -77,9 +78,13 @@ def reached(things) -> list:
 
 
 def hangs(thing) -> list:
-    """How an object hangs on its parent."""
-    found = [thing.parent and thing.parent.name_full, thing.parent_type, thing.parent_bone]
-    return found + [row[:] for row in thing.matrix_parent_inverse]
+    """How an object hangs on its parent, whichever that is."""
+    return [
+        thing.parent is None,
+        thing.parent_type,
+        thing.parent_bone,
+        *(row[:] for row in thing.matrix_parent_inverse),
+    ]
 
 
 def stands(thing, moving: set[str]) -> list:
@@ -94,7 +99,10 @@ def _animation(thing) -> list:
 
 
 def _object(thing) -> list:
-    moving, found = animated(thing.animation_data), [thing.name_full, *hangs(thing)]
+    moving, found = (
+        animated(thing.animation_data),
+        [thing.name_full, thing.parent and thing.parent.name_full, *hangs(thing)],
+    )
     found += [_constraint(c, f'constraints["{_quoted(c)}"].', moving) for c in thing.constraints]
     found += [_numbers(thing, "", moving), *(_animated_by(data) for data in _animation(thing))]
     if thing.pose is not None:
@@ -247,6 +255,14 @@ def _of_hair(curve) -> bool:
 def _keys(curve) -> list:
     modifiers = [[modifier.type, *as_set(modifier, settings_of(modifier))] for modifier in curve.modifiers]
     return [*modifiers, *((*key.co, key.interpolation) for key in curve.keyframe_points)]
+
+
+def _points(curve) -> int:
+    """A number of a curve's keys: a face has a hundred thousand."""
+    values = np.empty((3, 2 * len(curve.keyframe_points)), np.float32)
+    for row, name in zip(values, ("co", "handle_left", "handle_right"), strict=True):
+        curve.keyframe_points.foreach_get(name, row)
+    return zlib.crc32(values)
 
 
 def _quoted(named) -> str:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes under the hair that ride on a bone, such as a head that is a separate object, or has a rig of its own: only what an armature deforms is
-its body.
+"""Meshes under the hair that a bone carries as a whole: a head that is a separate object, or a face with a rig of its own that follows
+the head. Only what an armature deforms is its body.
 """
 
 import numpy as np
@@ -8,8 +8,8 @@ import numpy as np
 from neuralocks_core.rotation import flat, inverse, transformed
 
 from . import curves
-from .binding import carrying_bone, deforming
-from .body import vertices
+from .binding import carrying_bone, deforming, followers
+from .body import followed_bone, vertices
 from .shown import in_renders
 
 MARGIN = 0.05
@@ -19,9 +19,16 @@ UNDER = 0.5
 
 
 def find(armature, bodies: list, scene) -> list:
-    """Rendered meshes with faces that ride on a bone of an armature, and are not among its `bodies`."""
-    meshes = (o for o in scene.objects if o.type == "MESH" and len(o.data.polygons) and o not in bodies)
-    return [o for o in meshes if carrying_bone(o, armature) and in_renders(o, scene)]
+    """Rendered meshes with faces that a bone of an armature carries as a whole, and that are not among its `bodies`."""
+    meshes = [o for o in scene.objects if o.type == "MESH" and len(o.data.polygons) and o not in bodies]
+    rigs = {other for o in meshes for other in deforming(o)}  # each is looked at once: a crowd has hundreds
+    joined = {other for other in rigs if followers(other, armature)}
+    return [
+        o
+        for o in meshes
+        if (carrying_bone(o, armature) or joined.intersection(deforming(o)) and followed_bone(o, armature))
+        and in_renders(o, scene)
+    ]
 
 
 def told(armature, parts: list, hairs: list, places: dict) -> tuple[str, ...]:
@@ -32,16 +39,16 @@ def told(armature, parts: list, hairs: list, places: dict) -> tuple[str, ...]:
 
 
 def _told(part, armature) -> str:
-    bone, others = carrying_bone(part, armature), deforming(part)
-    if others:
-        how = f"it is deformed by {others[0].name_full}, which follows the bone '{bone}'"
-        remedy = "choose it as Body, which then goes with that bone as a whole"
-    else:
+    bone, remedy = carrying_bone(part, armature), "choose it as Body"
+    if bone is not None:
         how = f"it rides on the bone '{bone}' as a whole"
-        remedy = (
-            f"choose it as Body, or take it off the bone with the rig at rest, parent it to {armature.name_full} with Armature "
-            "Deform, and give that bone's vertex group all its vertices"
+        remedy += (
+            f", or take it off the bone with the rig at rest, parent it to {armature.name_full} with Armature Deform, and give that "
+            "bone's vertex group all its vertices"
         )
+    else:
+        how = f"{deforming(part)[0].name_full}, which follows the bone '{followed_bone(part, armature)}', deforms it"
+        remedy += ", in place of any other, or join a copy of it to the body"
     return f"{part.name_full}: {how}, so it is not part of the body, and hair is not kept out of it; if it should be, {remedy}"
 
 

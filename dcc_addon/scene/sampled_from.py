@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a sampling of a rig's motion depends on, so that one that is out of date is noticed."""
 
-import zlib
-
 import bpy
 
 from ..session import session
@@ -64,11 +62,15 @@ def rigging_of(armature, scene) -> int:
 
 def posture_of(armature, scene) -> int:
     """A number that changes when unkeyed values pose this armature, or what it depends on, differently; hair bones count as they
-    are without the hair's motion. Also when a body is edited that some view layer leaves out.
+    are without the hair's motion.
     """
-    bodies = [body for body in bodies_of(armature, scene) if not _always_shown(body, scene)]
-    posed = [posture(_moved_together(armature, scene)), *map(unreported, bodies)]
-    return zlib.crc32(repr(posed).encode())
+    return posture(_moved_together(armature, scene))
+
+
+def edited_unseen(armature, scene, known: dict[str, int]) -> bool:
+    """Whether a body was edited that some view layer leaves out; `known` are the numbers of bodies that are as they were sampled."""
+    unseen = (body for body in bodies_of(armature, scene) if body.name_full in known and not _always_shown(body, scene))
+    return any(unreported(body) != known[body.name_full] for body in unseen)
 
 
 def moved_by(armature, scene) -> frozenset[str]:

@@ -28,6 +28,7 @@ from .layers import graph_of, layer_of, working_in
 from .lookup import find, named
 from .placing import world
 from .relations import found_anew
+from .rigging import unreported
 from .sampled_from import frames_of, key_of, moved_by, posture_of, rigging_of
 from .stepping import step, stepping
 from .watched import watched
@@ -89,6 +90,7 @@ class _Recording:
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
         self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
         self._posture, self._moved_by = posture_of(armature, self._scene), moved_by(armature, self._scene)
+        self._unreported = {body.name_full: unreported(body) for body in bodies}
         self._edits = session.edits
         self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
         self._rate = rate_of(self._scene)
@@ -232,6 +234,7 @@ class _Recording:
             own=self._own,
             rigging=self._rigging,
             posture=self._posture,
+            unreported=self._unreported,
             moved_by=self._moved_by,
             hairs_off=riding.strays_told(
                 [hair for name in hairs if name not in carriers and (hair := find(name)) is not None],

@@ -6,7 +6,7 @@ from ..session import SampledRig, session
 from .carried import hairs_of
 from .layers import layer_of, working_in
 from .lookup import named
-from .sampled_from import key_of, posture_of, rigging_of
+from .sampled_from import edited_unseen, key_of, posture_of, rigging_of
 from .sampling import in_slices
 from .stepping import step, stepping
 
@@ -56,4 +56,8 @@ def notice(armature, scene) -> None:
     """
     sampled = session.rigs.get(armature.name_full)
     if sampled is not None and not sampled.stale:
-        sampled.stale = sampled.rigging != rigging_of(armature, scene) or sampled.posture != posture_of(armature, scene)
+        sampled.stale = (
+            sampled.rigging != rigging_of(armature, scene)
+            or sampled.posture != posture_of(armature, scene)
+            or edited_unseen(armature, scene, sampled.unreported)
+        )

@@ -10,7 +10,11 @@ from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import apart, body_sampled, make_live, messages, points_at
 
-FACE = (("face", "", (0, 0, 1.55), (0, 0, 1.75)), ("jaw", "face", (0, -0.03, 1.6), (0, -0.1, 1.58)))
+FACE = (
+    ("target", "", (0, -0.5, 1.6), (0, -0.5, 1.7)),
+    ("face", "", (0, 0, 1.55), (0, 0, 1.75)),
+    ("jaw", "face", (0, -0.03, 1.6), (0, -0.1, 1.58)),
+)
 
 
 def beard_on_its_jaw(_folder: Path) -> None:
@@ -31,8 +35,12 @@ def beard_on_its_jaw(_folder: Path) -> None:
 
 
 def face_mesh(_folder: Path) -> None:
-    """A face mesh on the face's rig is told not to be part of the body; chosen as the body, it goes with the head."""
+    """A face mesh on the face's rig is told not to be part of the body; chosen as the body, it goes with the head, whatever else the
+    face's rig follows.
+    """
     rig, face = _two_rigs(0.0)
+    follow = face.pose.bones["target"].constraints.new("COPY_TRANSFORMS")
+    follow.target, follow.subtarget = rig, "hips"
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.12, location=(0, 0, 1.66))
     mesh = bpy.context.object
     mesh.name = "FaceMesh"
@@ -41,11 +49,25 @@ def face_mesh(_folder: Path) -> None:
     strands = scenes.hair(rig, 20)
     make_live(rig, strands)
     (note,) = session.rigs["Rig"].bodies_off
-    assert note.startswith("FaceMesh: it is deformed by Face, which follows the bone 'head'"), note
+    assert note.startswith("FaceMesh: Face, which follows the bone 'head', deforms it,"), note
     rig.neuralocks_character.body = mesh
     body_sampled(rig, mesh)
     sampled = session.rigs["Rig"]
     assert sampled.bodies == ("FaceMesh",) and not sampled.bodies_off and not messages(), messages()
+
+
+def deforming_rig(_folder: Path) -> None:
+    """A body on a rig of its own, each bone of which copies the one of that name, is weighted as there."""
+    rig = scenes.armature()
+    scenes.dance(rig)
+    other = scenes.armature("Deform")
+    skin = scenes.body(other)
+    for bone in other.pose.bones:
+        follow = bone.constraints.new("COPY_TRANSFORMS")
+        follow.target, follow.subtarget = rig, bone.name
+    rig.neuralocks_character.body = skin
+    bpy.context.scene.neuralocks.armature = rig
+    body_sampled(rig, skin)
 
 
 def _two_rigs(moved: float) -> tuple:

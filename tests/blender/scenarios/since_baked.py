@@ -7,7 +7,7 @@ import bpy
 from mathutils import Matrix
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, give_bone_model, make_live, needs_usd, points_at
+from tests.blender.checks import SAME, apart, choose, give_bone_model, make_live, needs_usd, points_at
 from tests.blender.panel import drawn
 
 
@@ -168,6 +168,17 @@ def groomed_since(folder: Path) -> None:
         bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
         assert told() == [what]
     hair = bpy.data.objects["Hair"]
+    assert operators.bake_attach() == {"FINISHED"} and not told()
+    hair.parent.name = hair.name = "Another"
+    assert not told(), "a name is no place"
+    choose(hair)
+    bpy.ops.object.duplicate()
+    bpy.context.scene.neuralocks.hair = bpy.context.object
+    assert bpy.context.object != hair and not told()
+    bpy.data.objects.remove(bpy.context.object)
+    bpy.context.scene.neuralocks.hair = hair
+    hair.neuralocks_hair.armature.neuralocks_character.wind = 2.0
+    assert told() == ["wind"]
     hair.neuralocks_hair.live = True
     assert not told()
     hair.neuralocks_hair.live = False

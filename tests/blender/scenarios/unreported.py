@@ -34,7 +34,7 @@ def edited_in_another_scene(_folder: Path) -> None:
 
 def body_out_of_view(_folder: Path) -> None:
     """A body that only renders draw, beside one that is shown in its place, is edited where Blender tells nothing of it; and the
-    camera icon of a modifier is not told of any body. Looking at the body or not changes nothing.
+    camera icon of a modifier is not told of any body. Hiding the body, also in another view layer, changes nothing.
     """
     from dcc_addon.scene.up_to_date import known
 
@@ -45,6 +45,11 @@ def body_out_of_view(_folder: Path) -> None:
             assert known(rig, scene) is not None
             scene.frame_set(8)
             assert known(rig, scene) is not None, "another frame is no edit"
+            if not hide:
+                _disable(skin)
+                scene.view_layers.new("Other").layer_collection.exclude = True
+                assert known(rig, scene) is not None, "hiding is no edit"
+                skin.hide_viewport = False
             edit(skin)
             bpy.context.view_layer.update()
             assert known(rig, scene) is None, (hide, edit)

@@ -101,7 +101,9 @@ def test_hair_that_moves_relative_to_its_head_is_told(tmp_path, unit, moved):
         way[:3, 3] /= unit
         op.Set(Gf.Matrix4d(way.T.tolist()), frame)
     stage.Save()
-    told = "/Hero/Hair: its own transform moves it by up to 30 mm relative to joint 'head' of /Hero/Rig, which carries it"
+    told = (
+        "/Hero/Hair: its own transform moves it by up to 30 mm relative to joint 'head' of /Hero/Rig, which carries it"
+    )
     assert [told in note for note in read_shot(path).notes if "its own transform" in note] == [True] * (moved > 0.01)
 
 
