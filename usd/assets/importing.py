@@ -39,6 +39,7 @@ def import_groom(
     up: str | None = None,
     *,
     character=None,
+    grooms=None,
     skeleton: str | None = None,
     head: str | None = None,
     with_character: bool = False,
@@ -53,7 +54,8 @@ def import_groom(
         up: "Y" or "Z", the source's upward axis.
         character: USD file of a character, on whose head the hair is put: upright hair that faces forward, anywhere. If no unit is
             given, it gets the head's size, too.
-        skeleton, head: as for `bake`.
+        grooms: prim paths of the wanted grooms of USD files; all hair if left out.
+        skeleton, head: as for `bake`, of the character on whose head the hair is put.
         with_character: write a layer over the character's file, which can be opened and baked as it is.
         progress: called with (done, total, message).
 
@@ -69,6 +71,8 @@ def import_groom(
     for option, value in (("with-character", with_character), ("skeleton", skeleton), ("head", head)):
         if value and character is None:
             raise NeuralocksError(f"--{option}: there is no character; name one with --character")
+    if grooms and not any(path.suffix.lower() in (*USD, *OTHERS) for path in sources):
+        raise NeuralocksError("--groom: only USD files have prims; leave it out")
     say = progress or silent
     if character is not None:
         say(0, 1000, "looking at the head")
@@ -81,7 +85,7 @@ def import_groom(
     notes += told
     for number, path in enumerate(sources):
         say((_READ if rig else _LAID) * number // len(sources), 1000, f"reading {path.name}")
-        read, told = _read(path, out, counted, up, rig is not None and unit is None, rig is not None)
+        read, told = _read(path, out, counted, up, grooms, rig is not None and unit is None, rig is not None)
         found += read
         notes += told
     if rig:
@@ -105,10 +109,10 @@ def _common_unit(sources: list[Path], sized: bool) -> tuple[float | None, list[s
     return formats.common_unit(sources, sized)
 
 
-def _read(source: Path, out: Path, unit, up, sized: bool, onto: bool) -> tuple[list[Authored], list[str]]:
+def _read(source: Path, out: Path, unit, up, grooms, sized: bool, onto: bool) -> tuple[list[Authored], list[str]]:
     """The grooms of a file, and what a user should know; `sized` if a head sizes them, `onto` if they are put on one."""
     if source.suffix.lower() in (*USD, *OTHERS):
-        return read_usd(source, out, unit, up, sized, onto)
+        return read_usd(source, out, unit, up, grooms, sized, onto)
     from neuralocks_core import formats
 
     groom, look, notes = formats.read_with_look(source, unit, up)

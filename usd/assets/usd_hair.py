@@ -16,6 +16,7 @@ from ..border.placement import Placement
 from ..border.stage_files import check_not_input, open_stage
 from ..border.stopping import check
 from ..border.units import Border
+from ..shot.alike import one_person
 from ..shot.attach import Attachment, off_head
 from ..shot.curve_ends import beyond_ends
 from ..shot.curves import find_curves, read_groom, widths_attribute, without_points
@@ -39,25 +40,26 @@ ASKEW = 1.0
 
 
 @names_damage
-def read_usd(source: Path, out: Path, unit, up, sized: bool, onto: bool) -> tuple[list[Authored], list[str]]:
+def read_usd(source: Path, out: Path, unit, up, grooms, sized: bool, onto: bool) -> tuple[list[Authored], list[str]]:
     """The curves of a USD file that are hair, where the stage shows them at rest, and what a user should know.
 
     Args:
-        source, out, unit, up: as for `importing.import_groom`.
+        source, out, unit, up, grooms: as for `importing.import_groom`.
         sized: a head sizes them.
-        onto: they are put on a head: if the file says which way their own one faces, they are turned to face forward.
+        onto: they are put on a head: if the file has the character that carries them, they are as in its bind pose and face forward;
+            the hair of other characters, and what no head carries, is left out.
 
     Raises:
         NeuralocksError: the file cannot be read, or has no hair.
     """
     stage = open_stage(source)
     check_not_input(out, stage)
-    border = Border.of(stage)
-    metres = border.metres_per_unit if unit is None else metres_per_unit(unit)
-    border = Border(metres, border.up_axis if up is None else upward_axis(up), border.rate, border.frame)
+    own = Border.of(stage)
+    metres = own.metres_per_unit if unit is None else metres_per_unit(unit)
+    border = Border(metres, own.up_axis if up is None else upward_axis(up), own.rate, own.frame)
     found, notes, left = [], composition_notes(stage, source), []
     notes += [] if sized or unit is not None else unit_notes(stage, source)
-    every = find_curves(stage)
+    every = find_curves(stage, grooms)
     hair = open_curves(every)
     closed, empty = [prim for prim in every if prim not in hair], without_points(hair)
     notes += few(
@@ -67,21 +69,24 @@ def read_usd(source: Path, out: Path, unit, up, sized: bool, onto: bool) -> tupl
         ]
     )
     notes += few([no_points(str(prim.GetPath())) for prim in empty]) + few(of_other_kinds(stage))
-    filled, carried = [prim for prim in hair if prim not in empty], _carried(stage, every)
-    for prim, place in zip(filled, _places(filled), strict=True):
-        curves, place, own = UsdGeom.BasisCurves(prim), border.to_core @ place, carried.get(prim)
-        if own is not None and onto and up is None:
-            place, turned = _facing_forward(place, own)
-            notes += turned
+    filled = [prim for prim in hair if prim not in empty]
+    carried, uncarried = _carried(stage, every, named=bool(grooms))
+    if onto and carried and border.up_axis == own.up_axis:
+        placed, told = _facing_forward(carried, metres / own.metres_per_unit)
+        notes += uncarried + told
+    else:
+        placed = [(prim, border.to_core @ place) for prim, place in zip(filled, _places(filled), strict=True)]
+    for prim, place in placed:
+        curves = UsdGeom.BasisCurves(prim)
         groom = read_groom(prim, place, notes)
         notes += [] if sized else groom_notes(prim, groom, border)
         if widths_attribute(curves).ValueMightBeTimeVarying():
             notes.append(f"{prim.GetPath()}: its widths change over time; the first ones are imported")
         tokens = [str(a.Get()) for a in (curves.GetTypeAttr(), curves.GetBasisAttr(), curves.GetWrapAttr())]
         found.append(Authored(groom, Spline(*tokens), read_beside(prim, groom, left), beyond_ends(prim)))
+        notes += carried[prim].turned if prim in carried else []
     if not found:
         raise no_groom(stage, source, "give a file with hair curves")
-    notes += [note for own in carried.values() for note in own.turned]
     return found, notes + few(left, "primvars and materials are not imported like that")
 
 
@@ -102,30 +107,44 @@ def _places(curves: list[Usd.Prim]) -> Iterator[np.ndarray]:
         yield known[path] @ geom_bind(prim)
 
 
-def _facing_forward(place: np.ndarray, own: Attachment) -> tuple[np.ndarray, list[str]]:
-    """The place (4, 4) of curves, turned so that the head that carries them faces +Z, and the note on that; as it is, if it does."""
-    if off_head(own):
-        return place, []
-    forward = polar(own.character.facing @ own.to_bind[:3, :3])[0] @ polar(place[:3, :3])[0].T
-    angle = float(np.degrees(angle_between(forward, np.eye(3))))
-    if not angle > ASKEW:
-        return place, []
-    turn = np.eye(4)
-    turn[:3, :3] = forward
-    return turn @ place, [
-        f"{own.rig.path}: where its hair is, its head faces {angle:.0f} degrees off forward; the hair was turned to face forward"
-    ]
+def _facing_forward(
+    carried: dict[Usd.Prim, Attachment], scale: float
+) -> tuple[list[tuple[Usd.Prim, np.ndarray]], list[str]]:
+    """The curves of the first character, each with its way (4, 4) to that one's bind pose, turned to face +Z and scaled; and notes on how
+    its head faces where the hair is shown, and on the hair of other characters.
+    """
+    first = next((each for each in carried.values() if not off_head(each)), next(iter(carried.values()))).rig
+    turn, found, others = np.eye(4), [], []
+    turn[:3, :3] = scale * first.character.facing
+    for prim, each in carried.items():
+        if each.rig is first or one_person(first, each.rig):
+            found.append((prim, turn @ each.to_bind))
+        else:
+            others.append(
+                f"{prim.GetPath()}: is hair of {each.rig.path}, not of {first.path}, so it is left out; name it with --groom"
+            )
+    prim, way = found[0]
+    shown = polar((first.border.to_core @ next(_places([prim])))[:3, :3])[0]
+    angle = float(np.degrees(angle_between(polar(way[:3, :3])[0], shown)))
+    told = f"{first.path}: where its hair is, its head faces {angle:.0f} degrees off forward; the hair was turned to face forward"
+    return found, [told] * (angle > ASKEW) + few(others, "grooms are not its hair")
 
 
-def _carried(stage: Usd.Stage, curves: list[Usd.Prim]) -> dict[Usd.Prim, Attachment]:
-    """What carries the curves, as far as the file has their characters."""
+def _carried(stage: Usd.Stage, curves: list[Usd.Prim], named: bool) -> tuple[dict[Usd.Prim, Attachment], list[str]]:
+    """What carries the curves, as far as the file has their characters, and notes on those that nothing carries."""
     try:
         rigs, _ = read_each_rig(stage, find_skeletons(stage), Border.of(stage))
-        if not rigs:
-            return {}
-        search = HairSearch(rigs, None, [])
-        found = {prim: search.attachment(prim, Placement(prim)) for prim in search.filled(curves)}
     except NeuralocksError:  # whatever is wrong with its characters, its curves are imported
         check()
-        return {}
-    return {prim: own for prim, own in found.items() if own is not None}
+        return {}, []
+    if not rigs:
+        return {}, []
+    found, notes, search = {}, [], HairSearch(rigs, None, [], named=named)
+    for prim in search.filled(curves):
+        try:
+            own = search.attachment(prim, Placement(prim))
+            found |= {} if own is None else {prim: own}
+        except NeuralocksError as error:
+            check()
+            notes.append(str(error))
+    return found, search.no_hair() + few(notes)

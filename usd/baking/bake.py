@@ -94,7 +94,7 @@ def bake(
     check_felt(blown is None or groom_models.asked.feels_wind)
     cuts = given_cuts(cuts, loop)
     shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
-    options = {"strength": strength, "resolve": resolve, "loop": loop}
+    options = {"strength": float(strength), "resolve": resolve, "loop": loop}
     models = groom_models.each(shot.grooms)
     digests = {item.path: digest_of(each) for each, items in models for item in items}
     inputs = {"models": digests, "material": asdict(look), "wind": blown and asdict(blown)}
@@ -102,7 +102,7 @@ def bake(
     def poser(items: list[StageGroom]) -> GroomPoser:
         return GroomPoser(items, groom_models.of(items[0]), look, wind=in_core(blown, shot.border), **options)
 
-    alike = {"material": asdict(look), **options, "strength": float(strength)}
+    alike = {"material": asdict(look), **options}
     alike |= wind_facts(blown) | given_facts(cuts, joints)
 
     def facts(item: StageGroom) -> dict:

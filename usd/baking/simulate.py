@@ -73,6 +73,7 @@ def simulate(
     look = as_material(material)
     count = STRANDS if strands is None else strands
     check_number("--strands", count, 1, whole=True)
+    count = int(count)
     check_number("--volume", volume, 0, STIFFEST_VOLUME)
     loop = flag("--loop", loop)
     blown = as_wind(wind, gusts)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .command import note, print_json, say
-from .options import AsJson, Head, Out, Seed, Skeleton, WithCharacter, numbers
+from .options import AsJson, Grooms, Head, Out, Seed, Skeleton, WithCharacter, numbers
 
 
 def import_command(
@@ -31,6 +31,7 @@ def import_command(
         Path | None,
         typer.Option(help="USD character on whose head to put the hair."),
     ] = None,
+    groom: Grooms = None,
     skeleton: Skeleton = None,
     head: Head = None,
     with_character: WithCharacter = False,
@@ -44,7 +45,8 @@ def import_command(
     with progress_bar("importing") as progress:
         grooms, notes = import_groom(
             files, out, unit, up,
-            character=character, skeleton=skeleton, head=head, with_character=with_character, progress=progress,
+            character=character, grooms=groom or None, skeleton=skeleton, head=head, with_character=with_character,
+            progress=progress,
         )  # fmt: skip
     note(notes)
     if as_json:

@@ -12,6 +12,7 @@ from neuralocks_core.preview.film import Scene
 from neuralocks_core.rotation import transformed
 
 from ..border.values import as_numbers
+from ..shot.alike import one_person
 from ..shot.gaps import gaps, some
 from ..shot.made_from import baked_from_others
 from ..shot.recorded import recorded_cuts, recorded_joint, retimed
@@ -87,10 +88,15 @@ class Baked:
         """The grooms that are not hidden; all, if all are."""
         return [item for item in self.shot.grooms if drawn(item.prim)] or list(self.shot.grooms)
 
+    def is_first(self, rig: StageRig) -> bool:
+        """Whether a skeleton is that of the first groom that is shown, or another one of the same person."""
+        first = self.shown[0].attachment.rig
+        return rig is first or one_person(first, rig)
+
     def scene(self) -> Scene:
-        """All grooms of the first groom's skeleton and its body, for a preview; hidden ones only if nothing else is there."""
+        """All hair and the body of the first groom's person, for a preview; what is hidden only if nothing else is there."""
         first = self.shown[0].attachment
-        items = [item for item in self.shown if item.attachment.rig is first.rig]
+        items = [item for item in self.shown if self.is_first(item.attachment.rig)]
         character, rig = first.character, first.rig
         body = character.body if character.body is not None and len(character.body.points) <= MOST_BODY_POINTS else None
         head = np.stack([character.carrying(rig.joints_at(code)) for code in self.codes])

@@ -332,27 +332,3 @@ def test_real_hair_lies_on_another_head_and_bakes(tmp_path, names, model):
     out = bake(tmp_path / "real.usda", tmp_path / "hair.usdc", model, grooms=paths, frames="70").path
     card = evaluate(out, grooms=paths)
     assert all(card.grooms[path]["inside_at_rest_percent"] < 6 for path in paths)  # roots lie on the skin
-
-
-@pytest.mark.parametrize("bound", ["own", "mesh"])
-def test_hair_of_a_character_that_faces_elsewhere_is_put_on_facing_forward(bound, tmp_path):
-    """The file says which way its own head faces; where the hair is not put on another head, it stays as the file shows it."""
-    placed = {}
-    for angle in (0.0, 60.0, 180.0):
-        place = np.eye(4)
-        place[:3, :3] = Rotation.from_euler("y", angle, degrees=True).as_matrix()
-        path = write_shot(tmp_path, Recipe(bound=bound, place=place), f"turned_{angle:g}")
-        (groom,), notes = import_groom(path, tmp_path / "on.usda", character=BODY)
-        assert [note for note in notes if "off forward" in note] == (
-            [
-                f"/Hero/Rig: where its hair is, its head faces {angle:.0f} degrees off forward; the hair was turned to face forward"
-            ]
-            if angle
-            else []
-        )
-        (alone,), _ = import_groom(path, tmp_path / "alone.usda")
-        placed[angle] = groom.points, alone.points
-    turn = Rotation.from_euler("y", 60.0, degrees=True).as_matrix()
-    for angle in (60.0, 180.0):
-        assert placed[angle][0] == pytest.approx(placed[0.0][0], abs=1e-4)
-    assert placed[60.0][1] == pytest.approx(placed[0.0][1] @ turn.T, abs=1e-4)

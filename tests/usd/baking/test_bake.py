@@ -238,6 +238,14 @@ def test_a_groom_inside_an_instance_is_baked(tmp_path, model):
     assert np.array_equal(world_points(result.path, 3.0, "/A/Hair"), world_points(result.path, 3.0, "/B/Hair"))
 
 
+def test_numbers_of_numpy_are_numbers(tmp_path, model):
+    """As scripts have them."""
+    shot, files = write_shot(tmp_path), []
+    for number, strength in enumerate((0.5, np.float32(0.5))):
+        files.append(bake(shot, tmp_path / f"{number}.usdc", model, strength=strength, subframes=np.int64(1)).path)
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
 def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path, still_model):
     """USD also looks for names without ./ in the folder of the stage's first layer."""
     for name in ("show", "layout", "cache"):

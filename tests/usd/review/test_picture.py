@@ -41,6 +41,22 @@ def test_it_tells_whose_hair_is_not_drawn(tmp_path, monkeypatch):
     assert told == ["/Bert/Rig: its body has 416 points, more than 100, so only its hair is drawn"]
 
 
+def test_all_hair_of_one_person_in_two_skeletons_is_drawn(tmp_path, monkeypatch):
+    scenes, told = [], []
+    monkeypatch.setattr(picture.drawing, "render", lambda scene, path, **_: scenes.append(scene))
+    path = write_shot(tmp_path, Recipe(strands=4))
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    Sdf.CopySpec(layer, "/Hero", layer, "/Face")
+    stage = Usd.Stage.Open(layer)
+    for prim in Usd.PrimRange(stage.GetPrimAtPath("/Face")):
+        for relation in prim.GetRelationships():
+            relation.SetTargets([each.ReplacePrefix("/Hero", "/Face") for each in relation.GetTargets()])
+    layer.Save()
+    bake(path, tmp_path / "hair.usda", frames="1:2")
+    picture.preview(tmp_path / "hair.usda", "hair.png", tell=told.extend)
+    assert len(scenes[0].counts) == 8 and len(scenes[0].hair(0)) == scenes[0].counts.sum() and told == []
+
+
 def test_a_hidden_character_is_not_said_to_be_drawn(tmp_path, monkeypatch):
     """The note named it, and as another choice the one that was drawn."""
     monkeypatch.setattr(picture.drawing, "render", lambda scene, path, **_: path)
