@@ -19,7 +19,7 @@ def forget_data(changed) -> None:
     for thing in changed:
         if isinstance(thing, bpy.types.Mesh):
             session.weights.pop(thing.name_full, None)
-        elif isinstance(thing, bpy.types.ID) and thing.id_type == "CURVES":
+        elif isinstance(thing, bpy.types.Curves):
             session.grooms.pop(thing.name_full, None)
 
 
@@ -27,13 +27,17 @@ def mark_stale(graph, changed, carriers, switched: set[str]) -> None:
     """Motions are out of date if a body was edited, whichever scene shows it, or keys of any action that was not just `switched`; they
     are wanted of these armatures.
     """
+    if not (carriers or session.rigs):
+        return
     own = [thing.original for thing in changed]
     edited = _edits_body(graph, own)
     keys = [thing for thing in own if isinstance(thing, bpy.types.Action) and thing.name_full not in switched]
-    if not (edited or keys) or not (carriers or session.rigs):
+    users = users_of(keys) if keys else []
+    if not carriers:  # other keys show in poses, at which a render looks
+        users = [each for each in users if any(isinstance(user, bpy.types.Key) for user in each)]
+    if not (edited or users):
         return
-    users = [] if edited else users_of(keys)
-    found = [rig for rig in session.rigs.values() if not users or any(concerns(each, rig.moved_by) for each in users)]
+    found = [rig for rig in session.rigs.values() if edited or any(concerns(each, rig.moved_by) for each in users)]
     for sampled in found:
         sampled.stale = True
     session.edits += 1
