@@ -70,7 +70,7 @@ def read_usd(source: Path, out: Path, unit, up, grooms, sized: bool, onto: bool)
     )
     notes += few([no_points(str(prim.GetPath())) for prim in empty]) + few(of_other_kinds(stage))
     filled = [prim for prim in hair if prim not in empty]
-    carried, uncarried = _carried(stage, every, named=bool(grooms))
+    carried, uncarried = _carried(stage, filled, named=bool(grooms))
     if onto and carried and border.up_axis == own.up_axis:
         placed, told = _facing_forward(carried, metres / own.metres_per_unit)
         notes += uncarried + told

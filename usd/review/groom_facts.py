@@ -27,14 +27,17 @@ from ..shot.groom_notes import groom_notes
 from ..shot.hair_search import HairSearch
 from ..shot.made_from import baked_from_others
 from ..shot.recorded import recorded, retimed
+from ..shot.whole_body import WholeBodies
 
 
-def facts_of_grooms(search: HairSearch, curves, border: Border, spoils: list[str], stops: list[str]) -> list[dict]:
+def facts_of_grooms(
+    search: HairSearch, curves, bodies: WholeBodies, border: Border, spoils: list[str], stops: list[str]
+) -> list[dict]:
     """Facts about the curves that are hair; a problem with one of them does not hide the others."""
     grooms = []
     for prim in search.filled(curves):
         try:
-            groom = _groom(prim, search if search.rigs else None, border, spoils, stops)
+            groom = _groom(prim, search if search.rigs else None, bodies, border, spoils, stops)
             grooms += [groom] if groom else []
         except NeuralocksError as error:
             stops.append(str(error))
@@ -59,7 +62,9 @@ def groom_facts(groom: Groom) -> dict:
     }
 
 
-def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], stops: list[str]) -> dict | None:
+def _groom(
+    prim, search: HairSearch | None, bodies: WholeBodies, border: Border, spoils: list[str], stops: list[str]
+) -> dict | None:
     """Facts about one groom; `search` is None if there is no skeleton; returns None if the curves are not hair."""
     placement = Placement(prim)
     curves = UsdGeom.BasisCurves(prim)
@@ -87,7 +92,7 @@ def _groom(prim, search: HairSearch | None, border: Border, spoils: list[str], s
         facts["points beyond the ends, not drawn"] = int((~beyond.hair).sum())
     made = recorded(prim)
     if joint:
-        whole = search.on_whole_body(found)
+        whole = bodies.on(found)
         mover = suited(None, whole.character, groom)
         joint["shipped model"] = mover.stem
         spoils += groom_notes(prim, groom, border)

@@ -40,7 +40,7 @@ from ..shot.notes import (
 from ..shot.recorded import recorded, recorded_cuts
 from ..shot.skeletons import read_each_rig
 from ..shot.stage import frame_range
-from ..shot.whole_body import parts_elsewhere
+from ..shot.whole_body import WholeBodies
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .groom_facts import facts_of_grooms, groom_facts
@@ -95,10 +95,11 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     told = any(recorded_cuts(prim) is not None for prim in curves)
     skeletons = [_rig(rig) | {"hair chains": _chains(rig, spoils, bool(curves))} | _how_baked(rig) for rig in rigs]
     read = POSE_JOINTS if curves else RIG_JOINTS
+    bodies = WholeBodies(rigs)
     for rig in rigs:
         stops += without_turn(rig, read)
         spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + lies_down(rig)
-        spoils += partial_body(rig, parts_elsewhere(rig, rigs)[1])
+        spoils += partial_body(rig, bodies.of(rig)[1])
         spoils += [] if told else rig.cut_notes()
     moving = [rig for rig in rigs if rig.source.animated]
     if moving:
@@ -107,8 +108,8 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     elif rigs and not any("wind" in recorded(prim) for prim in curves):
         stops.append(not_animated(rigs[0]))
     search = HairSearch(rigs, head, spoils)
-    grooms = facts_of_grooms(search, curves, border, spoils, stops)
-    spoils += [note for each in map(search.on_whole_body, search.on_heads) for note in untrained(each.carrying)]
+    grooms = facts_of_grooms(search, curves, bodies, border, spoils, stops)
+    spoils += [note for each in map(bodies.on, search.on_heads) for note in untrained(each.carrying)]
     spoils += search.off_heads() + without_body(search.carriers, rigs)
     hairy = [rig for rig, skeleton in zip(rigs, skeletons) if skeleton["hair chains"]]
     if hairy and not grooms:

@@ -107,10 +107,8 @@ def _samples(frames: str | None, times: np.ndarray, border: Border, path: Path) 
 
 def _strands(baked: Baked, tell) -> tuple[drawing.Scene, Border]:
     scene, notes = baked.scene(), []
-    drawn, rigs = (
-        baked.shown[0].attachment.rig.path,
-        {item.attachment.rig.path: item.attachment.rig for item in baked.shot.grooms},
-    )
+    drawn = baked.shown[0].attachment.rig.path
+    rigs = {item.attachment.rig.path: item.attachment.rig for item in baked.shot.grooms}
     notes += _undrawn(drawn, [path for path, rig in rigs.items() if not baked.is_first(rig)])
     if scene.body is None and (body := baked.shown[0].attachment.character.body) is not None:
         notes.append(

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which curves of a stage are hair, and what carries them: the same answer for a bake and for `inspect`."""
 
-from dataclasses import replace
 from functools import cached_property
 
 from pxr import Usd
@@ -24,7 +23,6 @@ from .others import Others
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 from .seat_notes import coarsely_placed
 from .unusable import Unusable, find_unusable, lies_on
-from .whole_body import whole_body
 
 
 class HairSearch:
@@ -67,7 +65,6 @@ class HairSearch:
         self._of_characters: dict[Character, list[str]] = {}  # notes, made once for all grooms that one joint carries
         self.carriers: list[StageRig] = []
         self.on_heads: list[Attachment] = []
-        self._whole: dict[Character, Character] = {}
 
     def no_hair(self) -> list[str]:
         """Why curves are not taken for hair: notes if other hair was found; if none was, the first one is the error."""
@@ -133,13 +130,6 @@ class HairSearch:
             del self._notes[told:]
             self._far.append(f"{prim.GetPath()}: {error.fact}, so it is not taken for hair; {error.remedy}")
             return None
-
-    def on_whole_body(self, found: Attachment) -> Attachment:
-        """The same with the body that all skeletons skin; grooms that share a character still do."""
-        if found.character not in self._whole:
-            body, _ = whole_body(found.rig, self._every)
-            self._whole[found.character] = replace(found.character, body=body)
-        return replace(found, character=self._whole[found.character])
 
     def _attachment(self, prim: Usd.Prim, placement: Placement) -> Attachment | None:
         path, bound = str(prim.GetPath()), bound_skeleton(prim)

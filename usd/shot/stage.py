@@ -39,7 +39,7 @@ from .notes import (
 )
 from .others import Others
 from .skeletons import read_each_rig
-from .whole_body import whole_body
+from .whole_body import WholeBodies, whole_body
 
 
 @dataclass(frozen=True)
@@ -143,10 +143,12 @@ def read_shot(
         found = _moving(found, notes)
     every = rigs if others is None else [*rigs, *others.maybe_same()]
     used = tuple(rig for rig in rigs if any(item.attachment.rig is rig for item in found))
+    bodies = WholeBodies(every)
     for rig in used:
         if not still:
             _check_animated([rig])
-        found = _on_whole_body(found, rig, every, notes)
+        notes += rig.notes + lies_down(rig) + partial_body(rig, bodies.of(rig)[1])
+    found = [replace(item, attachment=bodies.on(item.attachment)) for item in found]
     notes += without_body(used, every) + _notes_on_motion(found)
     first, last = frame_range(stage, used)
     return Shot(
@@ -228,24 +230,6 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
             found.append(StageGroom(str(prim.GetPath()), prim, groom, attachment, placement, beyond))
             notes += groom_notes(prim, groom, attachment.rig.border)
     return found
-
-
-def _on_whole_body(grooms: list[StageGroom], rig: StageRig, every, notes: list[str]) -> list[StageGroom]:
-    """The grooms, those of a rig on its characters with what all skeletons skin of its body, with notes on the rig; grooms that share a
-    character still do.
-    """
-    body, left = whole_body(rig, every)
-    notes += rig.notes + lies_down(rig) + partial_body(rig, left)
-    if body is rig.character.body:
-        return grooms
-    own = {item.attachment.character for item in grooms if item.attachment.rig is rig}
-    on_body = {character: replace(character, body=body) for character in own}
-    return [
-        replace(item, attachment=replace(item.attachment, character=on_body[item.attachment.character]))
-        if item.attachment.character in own
-        else item
-        for item in grooms
-    ]
 
 
 def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:

@@ -2,14 +2,17 @@
 """One person in several skeletons, such as a face, a body and clothes: hair is kept out of the meshes of all of them."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.character import Character
 from neuralocks_core.skinned_body import Body
 
 from ..skel.stage_rig import StageRig
 from .alike import SAME, one_person
+from .attach import Attachment
 
 PROBES = 5
 """Times at which joints of two skeletons are compared, evenly over the animation."""
@@ -17,6 +20,34 @@ ARM = 0.1
 """Distance from a joint [m] at which its counterpart must move alike, too."""
 CARRIED = 0.5
 """Skin with less of its weights on joints that have a counterpart is left out."""
+
+
+class WholeBodies:
+    """The whole bodies of a stage's characters, each put together once.
+
+    Args:
+        rigs: all skeletons of the stage.
+    """
+
+    def __init__(self, rigs: Iterable[StageRig]):
+        self._rigs = rigs
+        self._bodies: dict[str, tuple[Body | None, list[str]]] = {}
+        self._characters: dict[Character, Character] = {}
+
+    def of(self, rig: StageRig) -> tuple[Body | None, list[str]]:
+        """The `whole_body` of a skeleton."""
+        if rig.path not in self._bodies:
+            self._bodies[rig.path] = whole_body(rig, self._rigs)
+        return self._bodies[rig.path]
+
+    def on(self, found: Attachment) -> Attachment:
+        """What carries a groom, on its whole body; grooms that share a character still do."""
+        body, own = self.of(found.rig)[0], found.character
+        if body is found.rig.character.body:
+            return found
+        if own not in self._characters:
+            self._characters[own] = replace(own, body=body)
+        return replace(found, character=self._characters[own])
 
 
 def whole_body(rig: StageRig, rigs: Iterable[StageRig]) -> tuple[Body | None, list[str]]:

@@ -69,6 +69,18 @@ def test_the_hair_of_one_character_is_taken_as_a_bake_tells_it_from_other_curves
     assert len(every) == 3, "where nothing is put on a head, all curves are imported"
 
 
+def test_what_is_said_to_be_left_out_is_left_out_where_it_is_named(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = Usd.Stage.Open(str(path))
+    Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Band")
+    band = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Band"))
+    band.CreateWrapAttr("periodic")
+    stage.Save()
+    grooms, notes = import_groom(path, tmp_path / "on.usda", character=BODY, grooms=["/Hero/Hair", "/Hero/Band"])
+    assert [groom.name for groom in grooms] == ["/Hero/Hair"]
+    assert any(note.startswith("/Hero/Band: its curves are closed") for note in notes)
+
+
 def test_parts_that_follow_the_head_in_different_ways_stay_together(tmp_path):
     path = write_shot(tmp_path, Recipe(place=_turned(90.0)))
     stage = Usd.Stage.Open(str(path))
