@@ -22,7 +22,7 @@ def hair_notes(hair) -> list[str]:
         blown = own.armature is not None and own.armature.neuralocks_character.wind > 0
         if blown and not prepared.hair.model.feels_wind:
             found.append("The model is for held poses, so this hair feels no wind")
-    if hair.name_full in session.renewed and own.live and not own.model.strip():
+    if hair.name_full in session.model_updated and own.live and not own.model.strip():
         found.append(NOTE)
     if has_cache(hair) and cached_strands.changed(hair.data):
         found.append("Its strands were changed since the bake, so its cache is off; press Bake and Attach again")

@@ -22,13 +22,13 @@ def remember() -> None:
     for hair in _shipped_hair():
         if hair.library is None:
             hair.neuralocks_hair.shipped = _checksum()
-    session.renewed.clear()
+    session.model_updated.clear()
 
 
 def compare() -> None:
     """After another file was opened: find live hair that another model moved. Files of add-ons that noted none count as such."""
     if bpy.data.filepath:
-        session.renewed = {h.name_full for h in _shipped_hair() if h.neuralocks_hair.shipped != _checksum()}
+        session.model_updated = {h.name_full for h in _shipped_hair() if h.neuralocks_hair.shipped != _checksum()}
 
 
 def _shipped_hair() -> list:

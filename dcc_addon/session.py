@@ -149,7 +149,7 @@ class Session:
     """How many files were opened before the one that is open."""
     opened: dict[str, tuple[int, int]] = field(default_factory=dict)
     """First and last frame of each scene when its file was opened."""
-    renewed: set[str] = field(default_factory=set)
+    model_updated: set[str] = field(default_factory=set)
     """Live hair that another model moved when the file was saved; see `model_updates`."""
     edits: int = 0
     """How often animation was edited: what was sampled meanwhile is out of date."""

@@ -190,8 +190,11 @@ def curves_at(stage: Usd.Stage, prim: str) -> UsdGeom.BasisCurves:
 
 def shares(curves: UsdGeom.BasisCurves) -> list[np.ndarray]:
     """Positions of the vertices along each of the groom's strands as modelled: shares of its length, from 0 to 1."""
-    ends = np.cumsum(curves.GetCurveVertexCountsAttr().Get())[:-1]
-    strands = np.split(np.array(curves.GetPointsAttr().Get(), dtype=float), ends)
+    counts, points = (
+        each.Get() or each.Get(Usd.TimeCode.EarliestTime())
+        for each in (curves.GetCurveVertexCountsAttr(), curves.GetPointsAttr())
+    )
+    strands = np.split(np.array(points, dtype=float), np.cumsum(counts)[:-1])
     lengths = [np.append(0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))) for points in strands]
     return [length / max(length[-1], 1e-12) for length in lengths]
 

@@ -32,7 +32,8 @@ def as_wind(mean, gusts: float | None = None) -> Wind | None:
             raise NeuralocksError(f"--gusts {gusts:g}: there is no wind that could vary; give --wind X,Y,Z, too")
         return None
     given = mean.tolist() if isinstance(mean, np.ndarray) else mean
-    if not isinstance(given, list | tuple) or len(given) != 3 or not all(isinstance(each, Real) for each in given):
+    given = [*given] if isinstance(given, list | tuple | Gf.Vec3d | Gf.Vec3f) else []
+    if len(given) != 3 or not all(isinstance(each, Real) for each in given):
         raise NeuralocksError(f"wind: {mean!r} is not one; give three numbers [m/s^2], such as (2, 0, 0)")
     wind = Wind(tuple(given)) if gusts is None else Wind(tuple(given), float(gusts))
     return wind if any(wind.mean) else None

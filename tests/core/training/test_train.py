@@ -113,16 +113,16 @@ def test_held_out_motion_is_never_trained_on(scene):
 def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(scene, few, tmp_path, monkeypatch):
     """With a budget in seconds, each step learns from what happens to be there."""
     graphs = []
-    for name, ready in (("early", 10), ("late", 0)):
+    for name, ready in (("early", 6), ("late", 0)):
         out = tmp_path / f"{name}.neuralocks"
         folder = tmp_path / f"{name}.neuralocks.training/rollouts"
         folder.mkdir(parents=True)
         for index in range(ready):
             save(folder / f"{index:06d}.npz", RolloutMaker(scene).make(index))
         monkeypatch.setattr("neuralocks_core.training.train.discard", lambda work: None)
-        train_strands(scene, out, RegressionOptions(steps=80, clips=4, strands=4), rollouts=10)
+        train_strands(scene, out, RegressionOptions(steps=30, clips=4, strands=4), rollouts=6)
         graphs.append(model.read(out).graphs)
-        assert model.read(out).meta["training"]["rollouts"] == 10
+        assert model.read(out).meta["training"]["rollouts"] == 6
     assert graphs[0] == graphs[1]
 
 
@@ -151,7 +151,7 @@ def test_a_killed_run_goes_on(scene, few, tmp_path, monkeypatch):
     """Killed while the first simulations are made, and again after the first checkpoint."""
     out = tmp_path / "hair.neuralocks"
     work = tmp_path / "hair.neuralocks.training"
-    short = RegressionOptions(steps=40, clips=8, strands=4)
+    short = RegressionOptions(steps=20, clips=4, strands=4)
 
     def kill_early(farm, count, say):
         wait(farm, 2, say)
@@ -174,7 +174,7 @@ def test_a_killed_run_goes_on(scene, few, tmp_path, monkeypatch):
         train_strands(scene, out, short, rollouts=8, resume=True, progress=kill_late)
     assert not out.exists() and (work / "checkpoint.npz").exists() and made.items() <= kept().items()
     train_strands(scene, out, short, rollouts=8, resume=True)
-    assert model.read(out).meta["training"]["steps"] >= 40
+    assert model.read(out).meta["training"]["steps"] >= 20
 
 
 def test_what_cannot_be_resumed_says_why(scene, tmp_path):

@@ -30,7 +30,7 @@ def test_wind_is_given_in_the_axes_of_the_stage(tmp_path, model):
     """Towards -Y and up of a stage in centimetres with Z up is towards +Z and up with Y up."""
     one = write_shot(tmp_path, Recipe(), "metres")
     other = write_shot(tmp_path, Recipe(unit=0.01, up="Z"), "centimetres")
-    bake(one, tmp_path / "one.usdc", model, wind=(2, 4, 6))
+    bake(one, tmp_path / "one.usdc", model, wind=Gf.Vec3f(2, 4, 6))
     bake(other, tmp_path / "other.usdc", model, wind=(2, -6, 4))
     for code in (1.0, 5.0, 9.0):
         assert world_points(tmp_path / "one.usdc", code) == pytest.approx(

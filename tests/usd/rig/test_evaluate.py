@@ -87,7 +87,8 @@ def test_depths_are_those_of_a_known_body(tmp_path, monkeypatch):
 
 
 def test_a_bake_keeps_hair_out_and_rests_and_the_command_says_so(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("usd.rig.evaluate.FRAMES", 12)
+    monkeypatch.setattr("usd.rig.evaluate.FRAMES", 4)
+    monkeypatch.setattr("usd.rig.evaluate.VERTICES", 1000)
     baked = bake_rig(EXAMPLE / "shot.usda", tmp_path / "baked.usdc", EXAMPLE / "quasi_static.neuralocks").path
     assert status("rig", "evaluate", baked, "--json") == 0
     card = json.loads(capsys.readouterr().out)
@@ -227,8 +228,11 @@ def test_what_cannot_be_measured_is_one_line(tmp_path):
         evaluate_rig(shot)
 
 
-def test_the_hair_of_a_bake_is_what_it_moves(tmp_path):
+def test_the_hair_of_a_bake_is_what_it_moves(tmp_path, monkeypatch):
     """Without naming its chains again; also in pictures and in what is inspected."""
+    monkeypatch.setattr("usd.rig.evaluate.FRAMES", 2)
+    monkeypatch.setattr("usd.rig.evaluate.DEEPEST_FRAMES", 2)
+    monkeypatch.setattr("usd.rig.evaluate.VERTICES", 500)
     some, shot = ["hair_back*_1", "hair_nape*_1"], tmp_path / "short.usda"
     whole = Usd.Stage.Open(str(EXAMPLE / "shot.usda")).Flatten()
     stage = Usd.Stage.Open(whole)
