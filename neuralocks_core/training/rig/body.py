@@ -4,17 +4,18 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from neuralocks_core.body.enclosed import proven_distances
-from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.training.rig.surface_samples import SurfaceSamples, nearest
 
+KEPT = 2000
+"""Number of places of each posed body that say which of its faces is nearest."""
 AROUND = 1000
-"""Number of body vertices that a simulation collides with."""
+"""Number of places of the body that a simulation collides with."""
 BEYOND = 0.1
 """They are no farther from the head than this beyond the ends of bones at rest [m]. `HairRig.in_reach` is wider, because it leaves out
-nothing that hair may touch: of so few vertices, more would be far from the hair."""
+nothing that hair may touch: of so few places, more would be far from the hair."""
 
 
 class BodyPatch:
@@ -22,11 +23,16 @@ class BodyPatch:
 
     Attributes:
         body: that part, with blend shapes that leave the head unchanged.
-        kept: vertices whose planes are used.
-        rim: which of these touch the cut, (kept,).
+        samples: `count` places on it.
     """
 
-    def __init__(self, rig: HairRig, rng: np.random.Generator, most_points: int):
+    @classmethod
+    def of(cls, rig: HairRig, count: int) -> "BodyPatch | None":
+        """None if there is no body, or hair reaches none of its faces."""
+        body = rig.character.body
+        return None if body is None or not len(rig.points) or not rig.in_reach(body).any() else cls(rig, count)
+
+    def __init__(self, rig: HairRig, count: int):
         body, character = rig.character.body, rig.character
         inside = rig.in_reach(body)
         used = np.unique(body.triangles[inside])
@@ -40,34 +46,32 @@ class BodyPatch:
             mean = offsets[on_head > 0.9].mean(axis=0) if (on_head > 0.9).any() else 0.0
             shapes[name] = (offsets - mean) * (1 - on_head)[:, None]
         self.body = replace(near, shapes=shapes)
-        self.kept = np.sort(rng.permutation(len(used))[:most_points])
-        cut = np.zeros(len(body.points), bool)
-        cut[body.triangles[~inside]] = True
-        self.rim = cut[used][self.kept]
+        self.samples = SurfaceSamples(near.points, near.triangles, count)
 
 
 def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Signed distances (T, V) [m] of points (T, V, 3), canonical, to the body under world joint transforms (T, J, 4, 4)."""
-    body = BodyPatch(rig, np.random.default_rng(0), 1).body
+    patch = BodyPatch.of(rig, 1)
+    if patch is None:
+        return np.full(points.shape[:2], np.inf)
+    body = patch.body
     skinning = rig.character.skinning(joints)
     return np.stack([proven_distances(body.posed(m), body.triangles, p) for m, p in zip(skinning, points)])
 
 
 def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
-    """Distance (V,) [m] that canonical points (V, 3) may come near the body: their distance in bind pose, exact or to the plane
-    of the nearest body vertex, whichever is less.
+    """Distance (V,) [m] that canonical points (V, 3) may come near the body: their distance in bind pose, exact or as
+    `SurfaceSamples` have it, whichever is less.
 
-    In poses, distances are to such planes. Over the faces of a coarse body they are wrong by centimetres, and hair would be
-    thrown from where the artist put it.
+    In poses, distances are those. Where they are wrong, hair would be thrown from where the artist put it.
     """
-    exact, body = rest_distances(rig, points), rig.character.body
-    if body is None or not len(points):
+    exact, patch = rest_distances(rig, points), BodyPatch.of(rig, KEPT)
+    if patch is None:
         return exact
-    used = np.unique(body.triangles)
-    vertices = rig.character.canonical(body.points)
-    normals = vertex_normals(vertices, body.triangles)[used]
-    nearest = cKDTree(vertices[used]).query(points)[1]
-    return np.minimum(exact, np.einsum("vi,vi->v", points - vertices[used][nearest], normals[nearest]))
+    vertices, samples = rig.character.canonical(patch.body.points), patch.samples
+    found = nearest(samples.index(vertices), points)
+    normals, offsets = samples.planes(found, points, vertices[None], samples.normals(vertices)[None])
+    return np.minimum(exact, np.einsum("vi,vi->v", points, normals) - offsets)
 
 
 def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
@@ -79,23 +83,18 @@ def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
 
 
 def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """At most AROUND body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
+    """AROUND places of the body around the head for world joint transforms (T, J, 4, 4): points and normals (T, AROUND, 3) in
     canonical space of the head; None if there are none.
     """
     body = rig.character.body
     if body is None:
         return None
-    canonical = rig.character.canonical(body.points)
     reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + BEYOND
-    used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
-    near = np.flatnonzero(used)
-    if not len(near):
+    near = np.linalg.norm(rig.character.canonical(body.points), axis=1) < reach
+    body = body.only(body.triangles[near[body.triangles].any(axis=1)])
+    if not len(body.triangles):
         return None
-    chosen = np.sort(np.random.default_rng(0).permutation(near)[:AROUND])
-    normals = vertex_normals(body.points, body.triangles)[chosen]
-    points, turned = np.empty((2, len(joints), len(chosen), 3), np.float32)
-    for row, matrices in enumerate(rig.character.skinning(joints)):
-        blended = np.einsum("vi,vixy->vxy", body.joint_weights[chosen], matrices[body.joint_indices[chosen], :3])
-        points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
-        turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)
-    return points, turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+    samples = SurfaceSamples(body.points, body.triangles, AROUND)
+    posed = [samples.posed(body.posed(matrices)) for matrices in rig.character.skinning(joints)]
+    points, normals = (np.array(each, np.float32) for each in zip(*posed))
+    return points, normals

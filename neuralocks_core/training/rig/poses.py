@@ -6,25 +6,18 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from neuralocks_core.body.enclosed import proven_distances
-from neuralocks_core.materials import NO_PLANE
-from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import cores
-from neuralocks_core.training.rig.body import BodyPatch
+from neuralocks_core.training.rig.body import KEPT, BodyPatch
+from neuralocks_core.training.rig.surface_samples import nearest
 
 RANGE = np.radians([60.0, 80.0, 45.0])
 """Largest nod, turn and tilt of people's heads relative to the chest [rad]."""
-KEPT = 2000
-"""Vertices of each body whose planes give depths."""
 _SIEVE = 5e-3
-"""Points farther than this [m] outside the plane of the nearest body vertex are not measured exactly."""
-_TOGETHER = 96
-"""Points whose nearest body vertices are searched together: the distances compared stay in the processor's cache, which takes a
-third of the time of a tree query.
-"""
+"""Points farther than this [m] outside the plane of the nearest place of the body are not measured exactly."""
 
 
 class PosePool:
@@ -34,7 +27,6 @@ class PosePool:
         rig: hair and body.
         count: number of poses held at a time.
         rng: decides all of them.
-        whole: keep each whole body around the head too, for exact distances.
         moving: moments of motion to draw the poses from, posed @ inverse(bind) of every joint, (M, J, 4, 4); random
             necks if left out.
 
@@ -42,7 +34,7 @@ class PosePool:
         moment: the index of each pose's moment, (P,).
         relative: neck and upper chest relative to the head, from the bind pose, canonical, (P, 2, 3, 3).
         shapes: blend shape weights of each, (P, B).
-        bodies: with `whole`, vertices of the body around the head of each (V, 3) float32 [m], canonical; else None.
+        bodies: vertices of the body around the head of each, (P, V, 3) float32 [m], canonical; None without one.
     """
 
     def __init__(
@@ -50,19 +42,17 @@ class PosePool:
         rig: HairRig,
         count: int,
         rng: np.random.Generator,
-        whole: bool = False,
         moving: np.ndarray | None = None,
     ):
         self.rig, self.count, self._rng, self._oldest, self._moving = rig, count, rng, 0, moving
         self.moment = np.zeros(count, int)
         self.relative = np.empty((count, 2, 3, 3))
-        self._patch = BodyPatch(rig, rng, KEPT) if rig.character.body is not None and len(rig.points) else None
+        self._patch = BodyPatch.of(rig, KEPT)
         self.shapes = np.zeros((count, len(self._patch.body.shapes) if self._patch else 0))
-        self.bodies = [None] * count if self._patch and whole else None
-        kept = len(self._patch.kept) if self._patch else 0
-        self._normals = np.empty((count, kept, 3), np.float32)
-        # x, y, z and x.x of each body vertex: a matrix product with (-2 p, 1) finds the nearest to p.
-        self._points = np.empty((count, 4, kept), np.float32)
+        self.bodies = None
+        if self._patch:
+            self.bodies, self._normals = np.empty((2, count, len(self._patch.body.points), 3), np.float32)
+            self._index = np.empty((count, 4, KEPT), np.float32)
         self.renew(count)
 
     @property
@@ -89,12 +79,8 @@ class PosePool:
         self.shapes[rows] = np.clip(self._rng.normal(0, 0.35, (count, self.shapes.shape[1])), -0.8, 0.8)
         skinning = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)[:, None] @ skinning
         for row, matrices in zip(rows, skinning):
-            body = self._patch.body.posed(matrices, self.shapes[row]).astype(np.float32)
-            points = body[self._patch.kept]
-            self._points[row, :3], self._points[row, 3] = points.T, np.square(points).sum(axis=1)
-            self._normals[row] = vertex_normals(body, self._patch.body.triangles)[self._patch.kept]
-            if self.bodies is not None:
-                self.bodies[row] = body
+            self.bodies[row] = body = self._patch.body.posed(matrices, self.shapes[row])
+            self._normals[row], self._index[row] = self._patch.samples.normals(body), self._patch.samples.index(body)
         return rows
 
     def gravity(self, poses: np.ndarray) -> np.ndarray:
@@ -114,20 +100,17 @@ class PosePool:
         return held_features(spec, self.relative[poses], gravity)
 
     def planes(self, poses: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Plane of the body vertex nearest to each point (n, V, 3): normals (n, V, 3) and offsets (n, V), distance
+        """Plane of the body near each point (n, V, 3), across the way there: normals (n, V, 3) and offsets (n, V), distance
         = n.x - d.
         """
-        normals, offsets = np.empty_like(points), np.empty(points.shape[:2], points.dtype)
-        for row, pose in enumerate(poses):
-            nearest = _nearest(points[row], self._points[pose])
-            normals[row] = self._normals[pose, nearest]
-            offsets[row] = np.einsum("vi,iv->v", normals[row], self._points[pose, :3][:, nearest])
-            # At the cut to the rest of the body, a plane says nothing about inside and outside.
-            offsets[row][self._patch.rim[nearest]] = NO_PLANE[3]
-        return normals, offsets
+        found = np.concatenate([nearest(self._index[pose], some) for pose, some in zip(poses, points)])
+        normals, offsets = self._patch.samples.planes(
+            found, points.reshape(-1, 3), self.bodies, self._normals, np.repeat(poses, points.shape[1])
+        )
+        return normals.reshape(points.shape), offsets.reshape(points.shape[:2])
 
     def distances(self, poses: np.ndarray, points: np.ndarray, progress: Progress = silent) -> np.ndarray:
-        """Signed distances (n, V) [m] to the body, exact where a point (n, V, 3) may be inside, 1 elsewhere; needs `whole`."""
+        """Signed distances (n, V) [m] to the body, exact where a point (n, V, 3) may be inside, 1 elsewhere."""
         normals, offsets = self.planes(poses, points)
         near = np.einsum("nvi,nvi->nv", normals, points) - offsets < _SIEVE
         result = np.ones(near.shape)
@@ -142,17 +125,6 @@ class PosePool:
             for done, _ in enumerate(pool.map(measure, rows), 1):
                 progress(done, len(rows), "measuring what lies in the body")
         return result
-
-
-def _nearest(points: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """Which of the body's vertices, columns x, y, z, x.x of (4, n), is nearest to each of the points (V, 3)."""
-    asked, nearest = np.ones((len(points), 4), np.float32), np.empty(len(points), int)
-    asked[:, :3] = -2 * points
-    products = np.empty((_TOGETHER, body.shape[1]), np.float32)
-    for first in range(0, len(points), _TOGETHER):
-        some = slice(first, first + _TOGETHER)
-        np.matmul(asked[some], body, out=products[: len(asked[some])]).argmin(axis=1, out=nearest[some])
-    return nearest
 
 
 def _random_skinning(character, count, rng) -> np.ndarray:

@@ -43,7 +43,7 @@ def static_report(
         `penetration_*`: for the vertices that are outside at rest, exact distances.
     """
     say = progress or silent
-    pool = PosePool(rig, count, np.random.default_rng(seed), whole=True)
+    pool = PosePool(rig, count, np.random.default_rng(seed))
     poses = np.arange(count)
     gravity = pool.gravity(poses)
     turns = model.canonical_turns(pool.features(model.spec, poses, gravity))

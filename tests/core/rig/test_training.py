@@ -153,7 +153,7 @@ def with_balls() -> tuple[HairRig, float]:
 def test_depths_in_the_body_are_those_of_balls():
     """Wherever a point is: a nearest plane, or only a part of the surface, may take outside for inside."""
     rig, radius = with_balls()
-    pool = PosePool(rig, 4, np.random.default_rng(0), whole=True)
+    pool = PosePool(rig, 4, np.random.default_rng(0))
     rng = np.random.default_rng(1)
     count = len(pool.bodies[0]) // 2
     points = rng.uniform(-0.4, 0.4, (4, 4000, 3)).astype(np.float32)

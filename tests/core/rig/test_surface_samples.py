@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Distances to posed bodies while hair on bones learns: those of the exact search, for coarse and fine meshes."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.mesh import welded_vertices
+from neuralocks_core.rotation import from_vector
+from neuralocks_core.training.rig.surface_samples import SurfaceSamples, nearest
+
+RADIUS = 0.12
+
+
+def distances(samples: SurfaceSamples, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
+    found = nearest(samples.index(vertices), points)
+    normals, offsets = samples.planes(found, points, vertices[None], samples.normals(vertices)[None])
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
+    return (points * normals).sum(axis=1) - offsets
+
+
+def around(vertices, triangles, rng, reach=0.02):
+    """Points within a reach of a surface, on both sides."""
+    on = vertices[triangles].mean(axis=1)[rng.integers(0, len(triangles), 600)]
+    return on + rng.uniform(-reach, reach, on.shape)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "worst"),
+    [
+        (trimesh.creation.box((0.2, 0.24, 0.2)), 1e-6),
+        (trimesh.creation.icosphere(1, RADIUS), 1e-6),
+        (trimesh.creation.icosphere(3, RADIUS), 1e-3),
+    ],
+    ids=["twelve faces", "a coarse ball", "a fine ball"],
+)
+def test_distances_are_the_exact_ones_in_any_pose(mesh, worst):
+    """Also with seams, along which faces share no vertices. The plane of the nearest vertex is off by centimetres on such a box."""
+    points, triangles = np.array(mesh.vertices), np.array(mesh.faces)
+    split = points[triangles].reshape(-1, 3)
+    for vertices, faces in ((points, triangles), (split, np.arange(len(split)).reshape(-1, 3))):
+        samples, (first, place) = SurfaceSamples(vertices, faces, 600), welded_vertices(vertices)
+        posed = vertices * (1.1, 0.95, 1.0) @ from_vector(np.array([0.4, 0.2, -0.3])).T + (0.1, 0.2, 0.0)
+        some = around(posed, faces, np.random.default_rng(0))
+        exact = Collider(posed[first], place[faces]).distance(some)[0]
+        found = distances(samples, posed, some)
+        assert (exact < -0.005).sum() > 50 and (exact > 0.005).sum() > 50
+        assert np.quantile(np.abs(found - exact), 0.99) < worst
+
+
+def test_nothing_is_inside_beyond_an_open_edge():
+    """Of a bowl, whose inner side is 'inside': above its rim, no side is; so at the cut of a body to its part around the head."""
+    ball = trimesh.creation.icosphere(3, RADIUS)
+    faces = np.array(ball.faces)[(ball.vertices[:, 1] < 1e-6)[ball.faces].all(axis=1)]
+    samples = SurfaceSamples(np.array(ball.vertices), faces, 600)
+    below, above = (np.array([[0.02, y, 0.01], [-0.03, y, 0.0]]) for y in (-0.1, 0.1))
+    inside, over = (distances(samples, np.array(ball.vertices), some) for some in (below, above))
+    assert (inside < 0).all() and (over > 1).all()
