@@ -6,16 +6,17 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.body.enclosed import proven_distances
+from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.training.rig.surface_samples import SurfaceSamples, nearest
 
 KEPT = 2000
 """Number of places of each posed body that say which of its faces is nearest."""
 AROUND = 1000
-"""Number of places of the body that a simulation collides with."""
+"""Number of body vertices that a simulation collides with."""
 BEYOND = 0.1
 """They are no farther from the head than this beyond the ends of bones at rest [m]. `HairRig.in_reach` is wider, because it leaves out
-nothing that hair may touch: of so few places, more would be far from the hair."""
+nothing that hair may touch: of so few vertices, more would be far from the hair."""
 
 
 class BodyPatch:
@@ -83,18 +84,23 @@ def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
 
 
 def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """AROUND places of the body around the head for world joint transforms (T, J, 4, 4): points and normals (T, AROUND, 3) in
+    """At most AROUND body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
     canonical space of the head; None if there are none.
     """
     body = rig.character.body
     if body is None:
         return None
+    canonical = rig.character.canonical(body.points)
     reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + BEYOND
-    near = np.linalg.norm(rig.character.canonical(body.points), axis=1) < reach
-    body = body.only(body.triangles[near[body.triangles].any(axis=1)])
-    if not len(body.triangles):
+    used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
+    near = np.flatnonzero(used)
+    if not len(near):
         return None
-    samples = SurfaceSamples(body.points, body.triangles, AROUND)
-    posed = [samples.posed(body.posed(matrices)) for matrices in rig.character.skinning(joints)]
-    points, normals = (np.array(each, np.float32) for each in zip(*posed))
-    return points, normals
+    chosen = np.sort(np.random.default_rng(0).permutation(near)[:AROUND])
+    normals = vertex_normals(body.points, body.triangles)[chosen]
+    points, turned = np.empty((2, len(joints), len(chosen), 3), np.float32)
+    for row, matrices in enumerate(rig.character.skinning(joints)):
+        blended = np.einsum("vi,vixy->vxy", body.joint_weights[chosen], matrices[body.joint_indices[chosen], :3])
+        points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
+        turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)
+    return points, turned / np.linalg.norm(turned, axis=-1, keepdims=True)

@@ -63,12 +63,6 @@ class SurfaceSamples:
         places = _places(points[self.triangles[self.faces[:, 0]]], self._shares).astype(np.float32)
         return np.concatenate([places.T, np.square(places).sum(axis=1)[None]])
 
-    def posed(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The places and the unit normals of their faces, (count, 3) each, on vertices (V, 3) [m]; a face without area has none."""
-        corners = points[self.triangles[self.faces[:, 0]]]
-        a, b, c = np.moveaxis(corners, 1, 0)
-        return _places(corners, self._shares), unit(np.cross(b - a, c - a))
-
     def normals(self, points: np.ndarray) -> np.ndarray:
         """Unit normals (V, 3) at vertices (V, 3) [m]; where faces meet without sharing vertices, as along a texture's seams, those of
         all of them.
