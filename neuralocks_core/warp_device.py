@@ -3,7 +3,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
 
@@ -26,12 +26,12 @@ def start_warp(device: str) -> ModuleType:
         raise NeuralocksError('warp: is not installed; pip install "neuralocks[compare]"') from missing
     wp.config.log_level = wp.LOG_ERROR
     wp.config.enable_backward = False
-    with _quiet() if device == "cpu" else nullcontext():
+    with _quiet():
         _init(wp)
-    try:
-        wp.get_device(device)
-    except Exception as unknown:
-        raise NeuralocksError(f"device {device}: not found by warp; use cpu") from unknown
+        try:
+            wp.get_device(device)
+        except Exception as unknown:
+            raise NeuralocksError(f"device {device}: not found by warp; use cpu") from unknown
     return wp
 
 
@@ -47,7 +47,7 @@ def _init(wp: ModuleType) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep warp's native start from telling a user of the CPU that there is no GPU: it writes past Python."""
+    """Keep warp's native start from telling that there is no GPU, in lines of its own: it writes past Python."""
     try:
         kept = os.dup(2)
     except OSError:  # a process without a console

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.number_arrays import number_array
+from neuralocks_core.whole_numbers import is_whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,19 @@ def head_motion(head: np.ndarray, substeps: int) -> HeadMotion:
     at = np.arange((frames - 1) * substeps + 1) / substeps
     knots = np.arange(frames)
     return HeadMotion(RotationSpline(knots, turns)(at).as_quat(), PchipInterpolator(knots, origin)(at))
+
+
+def frames_without(head: np.ndarray, ahead: int) -> int:
+    """How many of the head's frames are simulated, if the last ones, `ahead`, only shape its motion before.
+
+    Raises:
+        NeuralocksError: none is left, or it is no number of frames.
+    """
+    if not (is_whole(ahead) and 0 <= ahead < len(head)):
+        raise NeuralocksError(
+            f"ahead {ahead!r}: must be a whole number from 0 on, below the {len(head)} frames of head"
+        )
+    return len(head) - ahead
 
 
 def between(values: Sequence[np.ndarray] | np.ndarray, step: int, substeps: int) -> np.ndarray:

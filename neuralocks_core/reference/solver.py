@@ -20,7 +20,7 @@ from neuralocks_core.reference.arguments import (
     check_start,
     check_wind,
 )
-from neuralocks_core.reference.head_motion import HeadMotion, between, head_motion
+from neuralocks_core.reference.head_motion import HeadMotion, between, frames_without, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 
 INTEGRATOR = "BDF2"
@@ -56,6 +56,7 @@ def simulate(
     *,
     dt: float = 1 / 30,
     substeps: int = 1,
+    ahead: int = 0,
     iterations: int = 10,
     tolerance: float = 1e-3,
     rest_support: bool = True,
@@ -88,6 +89,8 @@ def simulate(
         material: object or mapping with bend, weight, damping, clumping, each a number or (S,); None: `Material()`.
         dt: time between frames [s].
         substeps: steps per frame.
+        ahead: so many of head's last frames are not simulated, so that T is less by them elsewhere: they only shape its motion
+            over the substeps before.
         iterations: most Newton steps per step.
         tolerance: a strand is solved when the rms net force is below this fraction of its weight.
         rest_support: bind pose is an equilibrium.
@@ -111,7 +114,7 @@ def simulate(
     strands, vertices = rods.mass.shape
     check_settings(dt, margin, gravity, substeps=substeps, iterations=iterations)
     check_amounts(volume=volume, collision=collision, tolerance=tolerance)
-    way, frames = head_motion(head, substeps), len(head)
+    way, frames = head_motion(head, substeps), frames_without(head, ahead)
     # relative to the head's first position: far from the world's origin, rounding would dominate
     away = way.origin[0]
     way = replace(way, origin=way.origin - away)

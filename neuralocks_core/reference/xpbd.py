@@ -9,8 +9,8 @@ import numpy as np
 from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
-from neuralocks_core.reference.arguments import check_body, check_material, check_settings, check_wind
-from neuralocks_core.reference.head_motion import HeadMotion, head_motion
+from neuralocks_core.reference.arguments import check_body, check_material, check_settings, check_start, check_wind
+from neuralocks_core.reference.head_motion import HeadMotion, frames_without, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 from neuralocks_core.reference.solver import SimulatedHair
 from neuralocks_core.reference.stepper import REACH
@@ -26,7 +26,9 @@ def simulate_xpbd(
     *,
     dt: float = 1 / 30,
     substeps: int = 20,
+    ahead: int = 0,
     rest_support: bool = True,
+    start: np.ndarray | None = None,
     bind_body: np.ndarray | None = None,
     margin: float = MARGIN,
     gravity: float = G,
@@ -36,12 +38,13 @@ def simulate_xpbd(
 ) -> SimulatedHair:
     """Simulate strands by XPBD on the energies of `solver.simulate`, with one iteration in each of many substeps.
 
-    It starts from the rest shape (there is no equilibrium solve) and has no ties between neighbours. Edges keep the stretch that
-    one pass leaves; how stiff hair really is depends on the number of substeps.
+    There is no equilibrium solve before the first frame, and there are no ties between neighbours. Edges keep the stretch that one
+    pass leaves; how stiff hair really is depends on the number of substeps.
 
     Args:
-        rest, head, body, triangles, material, dt, rest_support, bind_body, margin, gravity, wind, device, progress: as
+        rest, head, body, triangles, material, dt, ahead, rest_support, bind_body, margin, gravity, wind, device, progress: as
             in `solver.simulate`.
+        start: as in `solver.simulate`, but None is the rest shape.
         substeps: per frame; the wind is the same in all of them. Beyond a few hundred, errors grow again: single precision rounds
             away what gravity does in so short a step.
 
@@ -52,15 +55,17 @@ def simulate_xpbd(
         NeuralocksError: as `solver.simulate`.
     """
     check_settings(dt, margin, gravity, substeps=substeps)
-    rods, way, frames = rest_rods(rest, rest_support=rest_support), head_motion(head, substeps), len(head)
+    rods, way = rest_rods(rest, rest_support=rest_support), head_motion(head, substeps)
+    frames = frames_without(head, ahead)
     strands, vertices = rods.mass.shape
     hair = _Hair(rods, way, check_material(material, strands), margin, gravity, device)
-    wind = check_wind(wind, frames)
+    wind, start = check_wind(wind, frames), check_start(start, rods)
     step, first = dt / substeps, head[0, :3, :3].astype(float)
-    hair.begin(first, (way.origin[1] - way.origin[0]) / step if frames > 1 else np.zeros(3))
+    drift = (way.origin[1] - way.origin[0]) / step if frames > 1 else np.zeros(3)
+    hair.begin(rods.points if start is None else start, first, drift)
     if body is not None:
-        start, faces = check_body(body, triangles, frames)
-        hair.attach_body((start - way.origin[0]) @ first if bind_body is None else np.asarray(bind_body), faces)
+        here, faces = check_body(body, triangles, frames)
+        hair.attach_body((here - way.origin[0]) @ first if bind_body is None else np.asarray(bind_body), faces)
     points = np.zeros((frames, strands, vertices, 3), np.float32)
     for t in range(frames):
         a, b = max(t - 1, 0) * substeps, t * substeps
@@ -98,10 +103,10 @@ class _Hair:
         self.limit = self._reals(np.full((self.strands, vertices), margin))
         self.mesh = None
 
-    def begin(self, first: np.ndarray, drift: np.ndarray) -> None:
-        """Start at rest in the first pose, rotation (3, 3), all moving with velocity `drift` (3,) [m/s]."""
-        self.x = self._vectors(self.rods.points @ first.T)
-        self.velocity = self._vectors(np.broadcast_to(drift, self.rods.points.shape))
+    def begin(self, points: np.ndarray, first: np.ndarray, drift: np.ndarray) -> None:
+        """Start at canonical points (S, K, 3) in the first pose, rotation (3, 3), all moving with velocity `drift` (3,) [m/s]."""
+        self.x = self._vectors(points @ first.T)
+        self.velocity = self._vectors(np.broadcast_to(drift, points.shape))
 
     def attach_body(self, bind: np.ndarray, faces: np.ndarray) -> None:
         """Measure the strands' distances at rest from (V, 3) bind points, canonical."""

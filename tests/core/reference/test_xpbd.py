@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip("warp", reason="the reference needs warp")
 
@@ -98,6 +99,27 @@ def test_stretch_shrinks_with_substeps_and_nothing_breaks():
         assert np.isfinite(points).all()
         stretch.append(np.abs(edge_lengths(points) / edge_lengths(rest) - 1).mean())
     assert stretch[1] < 0.3 * stretch[0]
+
+
+def test_hair_that_starts_in_equilibrium_stays_there():
+    """That of a tilted head, where hair at rest would fall."""
+    rest, head = groom(8, curl=0.3), np.tile(np.eye(4), (20, 1, 1))
+    head[:, :3, :3] = Rotation.from_euler("z", 70, degrees=True).as_matrix()
+    held = simulate(rest, head[:1]).points[0]
+    kept, fallen = (simulate_xpbd(rest, head, start=start, substeps=40).points for start in (held, None))
+    assert np.abs(kept - held).max() < 0.05 * np.abs(fallen - rest).max() > 1e-3
+
+
+@pytest.mark.parametrize("solver", [simulate, simulate_xpbd])
+def test_motion_between_frames_does_not_depend_on_where_a_clip_is_cut_off(solver):
+    """If it knows what comes after. The frames that only tell it are not simulated."""
+    rest, head = groom(2), shaken(40)
+    whole = solver(rest, head, substeps=5).points[:10]
+    cut, told = (solver(rest, head[: 10 + ahead], substeps=5, ahead=ahead).points for ahead in (0, 24))
+    assert told.tobytes() == whole.tobytes() != cut.tobytes()
+    for ahead in (-1, 40, 1.5):
+        with pytest.raises(NeuralocksError, match=f"ahead {ahead}: must be a whole number from 0 on"):
+            solver(rest, head, ahead=ahead)
 
 
 def test_no_substeps_is_refused():
