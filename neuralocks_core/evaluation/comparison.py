@@ -25,6 +25,8 @@ STEP = 1 / 30
 """Time step of the reference [s]: the one that models are trained on."""
 CROWDED_STEPS = 2
 """Substeps of a step with a volume term: its force is updated between Newton solves only, so that whole steps are less exact."""
+AHEAD = 24
+"""Steps beyond the last one that shape the head's motion over substeps: of a spline's end, so far away, nothing is left."""
 RUN_IN = 10.0
 """Time [s] after which earlier motion has died away: a loop's hair, simulated from rest for this long, ends a period where it
 began, except for millimetres in a few strands that creep over skin."""
@@ -73,6 +75,9 @@ def simulated(
     *,
     wind: Wind | None = None,
     volume: float = 0.0,
+    xpbd: int | None = None,
+    device: str = "cpu",
+    residuals: list[float] | None = None,
     progress: Progress | None = None,
 ) -> np.ndarray:
     """The reference's displacement (T, S, 24, 3) float32 [m] at ascending times (T,), canonical.
@@ -88,10 +93,14 @@ def simulated(
         material: of the hair.
         wind: that blows all the time.
         volume: stiffness against strands crowding closer than at rest [m^2/s^2]; models are trained without.
+        xpbd: XPBD with so many substeps in a step of the solver, instead of the implicit solver; it starts from that one's
+            equilibrium, and has neither a volume term nor ties within locks.
+        device: "cpu", "cuda" or "cuda:N".
+        residuals: to which what the solver left is added for each of its steps, see `SimulatedHair.residual`.
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the solver is not installed, or would take more than MOST_STEPS.
+        NeuralocksError: the solver is not installed, lacks the device, or would take more than MOST_STEPS.
     """
     steps = np.ceil((times[-1] - times[0]) / STEP - 1e-9)
     if not steps <= MOST_STEPS:
@@ -103,7 +112,7 @@ def simulated(
     part = np.searchsorted([p.start - 1e-9 for p in parts[1:]], times, side="right")
     # Times after a part's end are simulated apart: those before it must not depend on whether later ones are wanted.
     run = 2 * part + (False if clip.loop else times > np.array([p.end for p in parts])[part] + 1e-9)
-    options = {"wind": wind, "volume": volume}
+    options = {"wind": wind, "volume": volume, "xpbd": xpbd, "device": device, "residuals": residuals}
     result, runs = np.empty((len(times), *strands.rest.shape), np.float32), np.unique(run)
     for number, each in enumerate(runs):
         i, rows = each // 2, slice(*np.searchsorted(run, [each, each + 1]))  # times ascend, and so do runs
@@ -114,37 +123,40 @@ def simulated(
 
 
 def _from(
-    start: float, character, strands, clip, times, into, material, wind: Wind | None, volume: float, **options
+    start: float, character, strands, clip, times, into, material, *, wind, volume, xpbd, device, residuals, progress
 ) -> None:
     """The same as `simulated`, for a clip without cuts, with hair at rest at `start` [s]; written `into` (T, S, 24, 3): for minutes
     of motion, each copy takes gigabytes.
     """
-    from neuralocks_core.reference import simulate
+    from neuralocks_core.reference import simulate, simulate_xpbd
 
     stepped = Stepped.of(clip, joints_read(character))
     clip, start, times = stepped.clip, stepped.times(np.array([start]))[0], stepped.times(times)
+    substeps = xpbd or (CROWDED_STEPS if volume else 1)
+    ahead = AHEAD if substeps > 1 else 0
     # One step more than the last time needs, so that interpolation there is the same for any wanted times.
-    clock = start + STEP * np.arange(int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 2)
-    joints, shapes = _unscaled(character, _without_stop(character, clip, clock, times[-1])), clip.shape_at(clock)
+    steps = int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 2
+    clock = start + STEP * np.arange(steps + ahead)
+    joints = _unscaled(character, _without_stop(character, clip, clock, times[-1]))
+    head, clock, joints = character.canonical_to_world(joints), clock[:steps], joints[:steps]
+    shapes = clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
     body = triangles = bind = None
     if resolver.at_rest is not None:
         body = _PosedBody(resolver.body, joints @ character.inverse_bind, shapes)
         triangles, bind = resolver.body.triangles, resolver.at_rest.points
-    rollout = simulate(
-        strands.rest,
-        character.canonical_to_world(joints),
-        body,
-        triangles,
-        material or Material(),
-        dt=STEP,
-        neighbours=lock_mates(strands.rest, strands.lock),
-        bind_body=bind,
-        wind=wind and wind.at(clock, clip.period),
-        substeps=CROWDED_STEPS if volume else 1,
-        volume=volume,
-        **options,
-    )
+    rest, look, blown = strands.rest, material or Material(), wind and wind.at(clock, clip.period)
+    alike = {"dt": STEP, "bind_body": bind, "device": device}
+    how = {"substeps": substeps, "ahead": ahead, "wind": blown, "progress": progress, **alike}
+    if xpbd:
+        here, blowing = body and [body[0]], None if blown is None else blown[:1]
+        held = simulate(rest, head[:1], here, triangles, look, wind=blowing, **alike)
+        rollout = simulate_xpbd(rest, head, body, triangles, look, start=held.points[0], **how)
+    else:
+        ties = lock_mates(rest, strands.lock)
+        rollout = simulate(rest, head, body, triangles, look, neighbours=ties, volume=volume, **how)
+    if residuals is not None:
+        residuals += rollout.residual.tolist()
     _between(clock, rollout.points, times, into)
     into -= strands.rest
 

@@ -28,6 +28,8 @@ class BakeResult:
         notes: what a user should know.
         seconds: wall time.
         resumed: frames taken over from an interrupted bake, counted for each groom.
+        residual: median, worst and number of steps of what the implicit solver left in each, see
+            `neuralocks_core.reference.solver.SimulatedHair`; None if it solved nothing.
     """
 
     path: Path
@@ -36,6 +38,7 @@ class BakeResult:
     notes: list[str]
     seconds: float
     resumed: int
+    residual: dict | None = None
 
 
 def read_asked(

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bake by the reference solver instead of the network, for comparison: slow, and always from the first frame on."""
 
+import re
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,7 +16,9 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.comparison import BLOWN, RUN_IN, simulated
 from neuralocks_core.files import as_path
 from neuralocks_core.flags import flag
+from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
+from neuralocks_core.warp_device import start_warp
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
@@ -33,6 +36,8 @@ STRANDS = 2000
 """Strands simulated if no number is given."""
 STIFFEST_VOLUME = 100.0
 """Nobody means a stiffer one, and the solver would take ever longer."""
+MOST_SUBSTEPS = 500
+"""With more, XPBD's errors grow again, see `simulate_xpbd`."""
 
 
 def simulate(
@@ -50,6 +55,8 @@ def simulate(
     gusts: float | None = None,
     strands: int | None = None,
     volume: float = 0.0,
+    xpbd: int | None = None,
+    device: str = "cpu",
     loop: bool = False,
     cuts=None,
     tell: Callable[[list[str]], None] | None = None,
@@ -63,9 +70,12 @@ def simulate(
         strands: strands to simulate, in whole locks, 2000 if left out; the others follow the nearest of these and
             are pushed out of the body.
         volume: stiffness against strands crowding closer than in the groom [m^2/s^2]; models are trained without.
+        xpbd: move the hair by XPBD (Macklin and others 2016) instead of the implicit solver, with so many substeps per 1/30 s,
+            usually 10, 20 or 50. Its stretch is undone in the bake; it has no volume term and no clumping.
+        device: where the solver runs: "cpu", "cuda" or "cuda:N".
 
     Raises:
-        NeuralocksError: as `bake`, or the solver is not installed.
+        NeuralocksError: as `bake`, the solver is not installed, or the device is not there.
     """
     began = time.monotonic()
     out = as_path(out, "out")
@@ -75,35 +85,65 @@ def simulate(
     check_number("--strands", count, 1, whole=True)
     count = int(count)
     check_number("--volume", volume, 0, STIFFEST_VOLUME)
+    if xpbd is not None:
+        check_number("--xpbd", xpbd, 1, MOST_SUBSTEPS, whole=True)
+        xpbd = int(xpbd)
+        if volume:
+            raise NeuralocksError(f"--volume {volume:g}: XPBD keeps no strands apart; leave out --volume or --xpbd")
     loop = flag("--loop", loop)
     blown = as_wind(wind, gusts)
     cuts = given_cuts(cuts, loop)
+    _check_device(device)
     shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
     options = {"volume": float(volume), "loop": loop}
-    inputs = {"strands": count, "material": asdict(look), "wind": blown and asdict(blown), "codes": codes, **options}
+    solver = _solver_facts(xpbd, device)
+    inputs = {"material": asdict(look), "wind": blown and asdict(blown), "codes": codes, "strands": count}
+    inputs |= solver | options
+    residuals: list[float] = []
 
     def poser(items: list[StageGroom]) -> _SimulatedPoser:
         (item,) = items
-        how = {"wind": in_core(blown, shot.border), **options, "progress": progress}
-        return _SimulatedPoser(item, codes, shot.first, look, count, **how)
+        how = {"volume": float(volume), "xpbd": xpbd, "device": device, "residuals": residuals, "progress": progress}
+        wind = in_core(blown, shot.border)
+        return _SimulatedPoser(item, codes, shot.first, look, count, wind=wind, loop=loop, **how)
 
-    facts = {"solver": "rods", "material": asdict(look), "strands": count, **options}
+    facts = {**solver, "material": asdict(look), "strands": count, **options}
     facts |= wind_facts(blown) | given_facts(cuts, joints)
     notes = known_notes(shot, codes, loop, loop or cuts is None)
+    if xpbd and look.clumping != Material().clumping:
+        notes.append("XPBD does not tie the strands of a lock together: the material's clumping does nothing")
 
     def write() -> int:
         how = {"blown": blown is not None, "progress": progress}
         return write_samples(shot, out, codes, poser, inputs, lambda item: facts, **how)
 
-    return write_told(notes, tell, began, shot, out, codes, write)
+    result = write_told(notes, tell, began, shot, out, codes, write)
+    return replace(result, residual=None if xpbd else _summary(residuals))
+
+
+def _check_device(device: str) -> None:
+    """Refuse a device that is not there, before a shot is read for it."""
+    if not (isinstance(device, str) and re.fullmatch(r"cpu|cuda(:\d+)?", device)):
+        raise NeuralocksError(f"--device {device}: is none; write cpu, cuda or cuda:N")
+    start_warp(device)
+
+
+def _solver_facts(xpbd: int | None, device: str) -> dict:
+    """What a bake records of the solver that made it. Devices round differently, whichever of a kind it is."""
+    where = {} if device == "cpu" else {"device": device.partition(":")[0]}
+    return ({"solver": "xpbd", "substeps": xpbd} if xpbd else {"solver": "rods"}) | where
+
+
+def _summary(residuals: list[float]) -> dict | None:
+    if not residuals:
+        return None
+    return {"median": float(np.median(residuals)), "worst": max(residuals), "steps": len(residuals)}
 
 
 class _SimulatedPoser:
-    """Points of one groom, from a simulation of some of its strands."""
+    """Points of one groom, from a simulation of some of its strands; `how` is as for `simulated`."""
 
-    def __init__(
-        self, item: StageGroom, codes: list[float], first: float, material, count: int, *, wind, volume, loop, progress
-    ):
+    def __init__(self, item: StageGroom, codes: list[float], first: float, material, count: int, *, wind, loop, **how):
         self._rig, self._placer = item.attachment.rig, GroomPlacer(item)
         every = self._placer.strands
         chosen = every.whole_locks(count)
@@ -121,9 +161,7 @@ class _SimulatedPoser:
         character = item.attachment.character
         self._skin = RootSkin(character, [every], clip)
         begun = self._skin.begun(every)
-        self._moved = simulated(
-            character, begun.subset(chosen), clip, times, material, wind=wind, volume=volume, progress=progress
-        )
+        self._moved = simulated(character, begun.subset(chosen), clip, times, material, wind=wind, **how)
         mean = every.rest.mean(axis=1)
         self._chosen = chosen
         self._others = np.setdiff1d(np.arange(len(mean)), chosen)

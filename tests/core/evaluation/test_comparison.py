@@ -170,3 +170,12 @@ def test_a_volume_term_is_integrated_in_finer_steps(monkeypatch):
         answers[substeps] = simulated(character, strands, Clip(times, joints), times, volume=3.0)
     coarse, ours, fine = answers.values()
     assert np.sqrt(np.square(ours - fine).mean()) < 0.4 * np.sqrt(np.square(coarse - fine).mean()) > 1e-4
+
+
+def test_by_xpbd_hair_of_a_tilted_head_starts_where_it_hangs():
+    """XPBD itself finds no equilibrium: hair that starts as it rests on an upright head would fall."""
+    times, tilt = np.arange(20) / 30, np.eye(4)
+    tilt[:2, :2] = [[0.5, -(0.75**0.5)], [0.75**0.5, 0.5]]
+    character, strands = rigs.person(), rigs.straight_hair(4)
+    moved = simulated(character, strands, Clip(times, np.tile(tilt @ rigs.bind(), (20, 1, 1, 1))), times, xpbd=50)
+    assert np.abs(moved[0]).max() > 0.1 > 10 * np.abs(moved - moved[0]).max()  # it stretches a little
