@@ -18,7 +18,7 @@ from ..border.units import Border
 from ..rig.facing import askew_notes
 from ..rig.notes import RIG_JOINTS, mirrored_notes, weight_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
-from ..rig.stage import check_orients, core_meshes, describe_chains, is_baked, of_bake
+from ..rig.stage import check_authored, check_orients, core_meshes, describe_chains, is_baked, of_bake
 from ..rig.uneven import names_uneven_prims
 from ..shot.character_notes import lies_down, untrained, without_body
 from ..shot.curves import find_curves
@@ -151,6 +151,7 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
     try:
         with names_uneven_prims(rig):
             chains = assemble_rig(rig.character, meshes, of_bake(rig)).chains
+        check_authored(rig.source.prim)
         check_orients(rig, chains)
     except NoHairChains:
         spoils += unnamed_notes(rig, meshes, strands)

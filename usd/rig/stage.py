@@ -140,7 +140,7 @@ def read_rigged_hairs(
     for prim in prims:
         source = None
         try:
-            _check_authored(prim)
+            check_authored(prim)
             source = read_rig(stage, prim, border, head, skins=skins, **given)
             with names_uneven_prims(source):
                 wanted = chains or (of_bake(source) if as_baked else None)
@@ -236,7 +236,12 @@ def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:
             )
 
 
-def _check_authored(prim: Usd.Prim) -> None:
+def check_authored(prim: Usd.Prim) -> None:
+    """A rest pose is no stand-in for a bind pose here: hair would take the pose that a rig happens to rest in for its shape.
+
+    Raises:
+        NeuralocksError: a skeleton with joints has no bindTransforms.
+    """
     skeleton = UsdSkel.Skeleton(prim)
     joints, bind = skeleton.GetJointsAttr().Get(), skeleton.GetBindTransformsAttr().Get()
     if joints and not bind:

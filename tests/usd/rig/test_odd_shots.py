@@ -27,6 +27,16 @@ def test_bad_shots_are_told_in_one_line(tmp_path, options, words):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.usda", "good.usda"]
 
 
+def test_what_lacks_a_bind_pose_is_told_by_inspect_as_by_a_rig_bake(tmp_path):
+    """Chains that no rig bake would move are not listed as if one did."""
+    shot = small_shot(tmp_path / "bad.usda", bind=False)
+    with pytest.raises(NeuralocksError) as refusal:
+        read_rigged_hair(shot)
+    facts = inspect(shot)
+    assert f"note: {str(refusal.value).replace(': ', ': would stop a rig bake: ', 1)}" in as_text(facts)
+    assert not facts["skeletons"][0]["hair chains"] and "rig bake move its hair chains" not in as_text(facts)
+
+
 def test_a_character_that_is_hidden_by_its_scale_is_told_in_one_line(tmp_path):
     shot = small_shot(tmp_path / "shot.usda")
     model, stage = model_for(read_rigged_hair(shot)), Usd.Stage.Open(str(shot))
