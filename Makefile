@@ -1,5 +1,6 @@
 # make demo   see moving hair: installs the runtime without torch, bakes the shipped shot, makes a picture and a clip
 # make test   installs everything that the tests need, and runs the linter and all tests
+# make matrix runs the tests of the extension in every Blender that it supports; installs those that are Python modules
 # make addon  builds the Blender extension into dist/
 # make native compiles the C files again, for all platforms
 # make lowest runs the tests of what needs no torch with the oldest packages that pyproject.toml allows
@@ -16,7 +17,7 @@ INSTALL = $(BIN)/python $(PIP_INSTALL)
 # Python not to keep what it compiles: then each of the hundreds of processes that tests start compiles all it imports.
 TESTING = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 
-.PHONY: demo test lint tests lowest blender addon native bench clean
+.PHONY: demo test lint tests lowest blender matrix addon native bench clean
 
 demo: $(VENV)/installed-demo
 	$(BIN)/neuralocks demo -o $(OUT)
@@ -71,7 +72,8 @@ $(VENV)/installed-test: pyproject.toml constraints.txt | $(BIN)/python
 	touch $@ $(VENV)/installed-demo
 
 # Blender as a Python module, the oldest and the newest that the extension supports; where the interpreter or the
-# wheel is missing, the tests that need it say so and are skipped.
+# wheel is missing, the tests that need it say so and are skipped. Only `make matrix` installs the versions between, 0.6 GB
+# each; to it, a missing one is an error.
 BLENDER_NEEDS = onnxruntime usd-core scipy
 # The first of that version that really runs: a version manager's stand-in may only say that it does not.
 find-python = $(shell for p in python$(1) $(HOME)/.pyenv/versions/$(1)*/bin/python$(1); do \
@@ -81,15 +83,22 @@ PYTHON_3_13 = $(call find-python,3.13)
 
 blender: .venv-blender-4.2/installed .venv-blender-5.2/installed
 
+matrix: $(VENV)/installed-test blender .venv-blender-4.5/installed .venv-blender-5.0/installed
+	NEURALOCKS_BLENDERS=all $(TESTING) $(BIN)/python -m pytest -n 2 --dist loadfile -q tests/blender
+
 .venv-blender-4.2/installed:
 	$(call blender-venv,$(PYTHON_3_11),4.2.23)
+.venv-blender-4.5/installed:
+	$(call blender-venv,$(PYTHON_3_11),4.5.15)
+.venv-blender-5.0/installed:
+	$(call blender-venv,$(PYTHON_3_11),5.0.1)
 .venv-blender-5.2/installed:
 	$(call blender-venv,$(PYTHON_3_13),5.2.3)
 
 define blender-venv
-@if [ -z "$(1)" ]; then echo "Blender $(2): its Python is not installed; its tests will be skipped"; else \
+@if [ -z "$(1)" ]; then echo "Blender $(2): its Python is not installed; its tests cannot run"; else \
     echo "Blender $(2): installing into $(@D)"; \
     { [ -d $(@D) ] || $(1) -m venv $(@D); } && \
     { $(@D)/bin/python $(PIP_INSTALL) bpy==$(2) $(BLENDER_NEEDS) && touch $@; } || \
-    echo "Blender $(2): could not be installed; its tests will be skipped"; fi
+    echo "Blender $(2): could not be installed; its tests cannot run"; fi
 endef

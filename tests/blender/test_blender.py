@@ -2,12 +2,12 @@
 """The add-on in real Blenders: one process for each, in which scenario follows scenario with a time limit, as an artist
 opens file after file; after one that fails comes a fresh process.
 
-The oldest and the newest are tested by default; NEURALOCKS_BLENDERS=all (or a list, `4.5,5.0`) chooses others.
+The oldest and the newest are tested by default, and skipped where they are not installed; NEURALOCKS_BLENDERS=all (or a list,
+`4.5,5.0`) chooses others, and then it is an error if one is not.
 """
 
 import contextlib
 import os
-import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -19,24 +19,17 @@ from . import scenarios
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
-VERSIONS = ("4.2", "4.5", "5.0", "5.2")
-WINDOWED = "3.4"
 LIMIT = 120
 SLOW = {"trained_for_real": 900}
 """Scenarios that take longer [s]: run with NEURALOCKS_SLOW=1."""
 
 
-def _wanted() -> list[str]:
-    chosen = os.environ.get("NEURALOCKS_BLENDERS", "4.2,5.2")
-    return [*VERSIONS, WINDOWED] if chosen == "all" else chosen.split(",")
-
-
 def _command(version: str) -> list[str]:
     """How to run a script in this Blender; skips if it is not installed."""
+    if why := blenders.lacking(version):
+        pytest.skip(why)
     script = str(HERE / "run.py")
-    if version == WINDOWED:
-        if not shutil.which("blender"):
-            pytest.skip("no blender program is installed")
+    if version == blenders.PROGRAM:
         return ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", script]
     return [str(blenders.python_of(version)), script]
 
@@ -52,7 +45,7 @@ class _Blender:
             "OMP_NUM_THREADS": "1",
             "BLENDER_USER_RESOURCES": str(folder),
         }
-        if version == WINDOWED:
+        if version == blenders.PROGRAM:
             environment["PYTHONPATH"] = str(blenders.packages_of("4.2"))
         with open(self.log, "wb") as log:
             self.process = subprocess.Popen(
@@ -96,7 +89,7 @@ def running():
         each.leave()
 
 
-@pytest.mark.parametrize("version", _wanted())
+@pytest.mark.parametrize("version", blenders.asked_for())
 @pytest.mark.parametrize("scenario", scenarios.modules())
 def test_scenario(version, scenario, running, random_model, tmp_path, tmp_path_factory):
     """Runs one scenario; its output is shown when it fails."""
