@@ -72,7 +72,7 @@ $(VENV)/installed-test: pyproject.toml constraints.txt | $(BIN)/python
 	touch $@ $(VENV)/installed-demo
 
 # Blender as a Python module, the oldest and the newest that the extension supports; where the interpreter or the
-# wheel is missing, the tests that need it say so and are skipped. Only `make matrix` installs the versions between, 0.6 GB
+# wheel is missing, the tests that need it say so and are skipped. Only `make matrix` installs the versions between, 1.3 GB
 # each; to it, a missing one is an error.
 BLENDER_NEEDS = onnxruntime usd-core scipy
 # The first of that version that really runs: a version manager's stand-in may only say that it does not.
