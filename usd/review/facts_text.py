@@ -20,7 +20,7 @@ def as_text(facts: dict, indent: int = 0) -> str:
             lines.append(f"{pad}{name}: {len(value)} {LONG[name]}, in --json")
         elif name == "began with":  # each training records the one that it started from
             lines.append(f"{pad}trainings before this one: {_trainings(value)}, in --json")
-        elif isinstance(value, dict):
+        elif isinstance(value, dict) and value:
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
         elif isinstance(value, list) and value and isinstance(value[0], dict):
             lines += _each(name, value, indent)
@@ -54,7 +54,7 @@ def _short(value) -> str:
     """A value, or a list of values, in a line."""
     if isinstance(value, list):
         return ", ".join(map(str, value)) or "none"
-    return "none" if value is None else f"{value:g}" if isinstance(value, float) else f"{value}"
+    return "none" if value is None or value == {} else f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
 def _trainings(card) -> int:
