@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from neuralocks_core.anatomy.humanoid import Humanoid, copies, find_humanoid
+from neuralocks_core.anatomy.joint_names import own_names
 from neuralocks_core.anatomy.own_skin import own_skin
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, rotation_part, sizes, transformed
@@ -123,6 +124,11 @@ class Character:
     def carrying_joint(self) -> int:
         """Index of the joint that carries the hair."""
         return self.head if self.carrier is None else self.carrier
+
+    @cached_property
+    def own_names(self) -> list[str]:
+        """What each joint (J) is called without its parents' names and the rig's; see `joint_names.own_names`."""
+        return own_names(self.skeleton.names, self.humanoid.get("head"))
 
     @cached_property
     def inverse_bind(self) -> np.ndarray:

@@ -61,8 +61,11 @@ _JAPANESE = {
     "目": "Eye",
 }
 """MikuMikuDance's standard bones, in files with UTF-8 names; a word that contains another comes before it."""
-_TRUNK = {"head", "neck", "spine", "hair"}
+_TRUNK = {"head", "neck", "spine"}
 """With the parts of limbs, words that say what a joint is, even if many joints begin with them."""
+_HAIR = "hair"
+"""Likewise, unless the trunk begins with it."""
+_WORD = "[A-Z]?[a-z]+|[LR](?=[UF]Arm)|[A-Z]+(?![a-z])"
 _PREFIX_ENDS = ":|_.-"
 SHARED = 0.9
 """Share of the joints that begin with a namespace; exporters add a root of their own above."""
@@ -87,9 +90,46 @@ def without_namespace(name: str) -> str:
     return name.rsplit(":", 1)[-1]
 
 
+def own_names(names: Sequence[str], head: int | None) -> list[str]:
+    """Names of joints without their parents' and without the rig's, which may be a word for hair or face: of `Hatsune:Jaw` and
+    `Hatsune_Jaw`, since USD writes a colon as an underscore, `Jaw`.
+
+    The head has the rig's name, too, and with it the neck or the spine, or nearly all joints that are not below the head. What only
+    its own joints begin with, `pony` or `FACIAL`, says what they are.
+
+    Args:
+        names: joint paths (J), separated by `/`.
+        head: index of the head's joint; if it is None, only what stands before a colon is the rig's name.
+    """
+    own = [without_namespace(leaf(name)) for name in names]
+    if head is None:
+        return own
+    beside = [j for j, name in enumerate(names) if j == head or not name.startswith(f"{names[head]}/")]
+    while True:
+        first, *rest = _own_words(own[head]) or [""]
+        meant = first in _SIDES or first in _TRUNK
+        if not rest or meant or not _is_of_rig(first, [own[j] for j in beside], own[head]):
+            return own
+        own = [_without_first(name) if _own_words(name)[:1] == [first] else name for name in own]
+
+
+def _is_of_rig(first: str, beside: list[str], head: str) -> bool:
+    """Whether the neck or the spine begins with this word, or nearly all of the joints that are not below the head, the head
+    among them.
+    """
+    within = [name for name in beside if _own_words(name)[:1] == [first]]
+    trunk = any({"neck", "spine"} & set(_own_words(name)) for name in within if name != head)
+    return trunk or len(within) >= max(SHARED * len(beside), 4)
+
+
+def _without_first(name: str) -> str:
+    """A name from its second word on; as it is if it begins with letters that are in no word."""
+    return re.sub(rf"^[\W\d_]*(?:{_WORD})[\W\d_]*", "", name)
+
+
 def words(name: str) -> list[str]:
     """Words of a name in lower case, without numbers; Motive's `LUArm` and `LFArm` have one letter for the side."""
-    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[LR](?=[UF]Arm)|[A-Z]+(?![a-z])", name)]
+    return [word.lower() for word in re.findall(_WORD, name)]
 
 
 def sides_and_keys(names: list[str], parts: set[str]) -> list[tuple[str, str]]:
@@ -129,7 +169,7 @@ def _is_namespace(first: str, names: list[list[str]]) -> bool:
         return False
     heads = [words for words in names if words[-1:] == ["head"]]
     trunk = len(heads) == 1 and heads[0] in within and any({"neck", "spine"} & set(words) for words in within)
-    return trunk or len(within) >= SHARED * len(names)
+    return trunk or first != _HAIR and len(within) >= SHARED * len(names)
 
 
 def _side_and_key(words: list[str]) -> tuple[str, str]:

@@ -55,13 +55,13 @@ def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHair
     names that do not say hair.
     """
     skeleton, head = character.skeleton, character.head
-    names, below = skeleton.names, character.of_head
+    names, own, below = skeleton.names, character.own_names, character.of_head
     others = ", ".join(leaf(names[j]) for j in skeleton.children[head][:8]) or "nothing"
     remedy = "name them with --chains PATTERN, or the joint that carries them with --head JOINT"
     # Outside the head, `tail` means a tail.
-    elsewhere = [j for j in np.flatnonzero(~below) if says_hair_alone(names[j])]
+    elsewhere = [j for j in np.flatnonzero(~below) if says_hair_alone(own[j])]
     drives = driving(skeleton, meshes)
-    named = [j for j in np.flatnonzero(below) if j not in character.heads and says_hair(names[j])]
+    named = [j for j in np.flatnonzero(below) if j not in character.heads and says_hair(own[j])]
     bare = [j for j in named if not drives[j]]
     caps = [j for j in named if meshes and _is_cap(character, j, meshes)]
     unnamed = left_out(character, meshes or [])
@@ -95,7 +95,7 @@ def left_out(
     """
     skeleton, found = character.skeleton, []
     drives = driving(skeleton, meshes)
-    face = np.array([says_face(name) for name in skeleton.names])
+    face = np.array([says_face(name) for name in character.own_names])
     tops = [] if chains is None else chains.joints[chains.roots]
     moved = np.any([np.zeros(len(face), bool), *map(skeleton.below, tops)], axis=0)
 
@@ -173,7 +173,7 @@ def _children(character: Character) -> list[int]:
 def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[int]:
     """First joints of the subtrees that are hair by their names or by what they drive."""
     skeleton = character.skeleton
-    names, children = skeleton.names, skeleton.children
+    names, children = character.own_names, skeleton.children
     used, body = driving(skeleton, meshes), of_the_body(character, meshes)
     least = 2 if _has_leaf_bones(character, used) else 1
     tops, todo = [], [(joint, False) for joint in _children(character)]
@@ -212,9 +212,9 @@ def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[Sk
     too continues from it. Taken for a holder, it would leave each bone to turn about a pivot of its own.
     """
     skeleton = character.skeleton
-    riding = riders(skeleton, joint, used)
+    riding = riders(character, joint, used)
     on = [child for child in skeleton.children[joint] if child not in riding and used[skeleton.below(child)].any()]
-    if used[joint] or len(on) != 1 or used[on[0]] or not riders(skeleton, continued(skeleton, on[0], used), used):
+    if used[joint] or len(on) != 1 or used[on[0]] or not riders(character, continued(character, on[0], used), used):
         return []
     return [] if any(_is_cap(character, rider, meshes) for rider in riding) else riding
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joint names that mean hair, and those that mean another part of the head or what it wears."""
+"""Joint names that mean hair, and those that mean another part of the head or what it wears. Callers give a joint's own name, of
+`Character.own_names`: a rig's name before it may be a word for either.
+"""
 
 import re
 

@@ -130,19 +130,19 @@ def _moving(
     """
     skeleton = character.skeleton
     drives = driving(skeleton, meshes)
-    inside = in_chains(skeleton, tops, drives, named)
+    inside = in_chains(character, tops, drives, named)
     order = np.flatnonzero(inside).tolist()
     carries = _carrying(skeleton, order, drives)
     rows, free, ends = {}, {}, {}
     for joint in order:
-        if continued(skeleton, joint, drives) != joint:
+        if continued(character, joint, drives) != joint:
             continue
-        riding = riders(skeleton, joint, drives)
+        riding = riders(character, joint, drives)
         beyond = [child for child in skeleton.children[joint] if inside[child]]
         # What has no skin beside what has some is a socket or a pole, and not where the bone ends.
         beyond = [child for child in beyond if child in carries] or beyond
         if len(beyond) > 1 and not carries.intersection(beyond):
-            beyond = _ahead(skeleton, joint, beyond, places)
+            beyond = _ahead(character, joint, beyond, places)
         own, only_markers = [joint, *riding], joint in carries and not carries.intersection(beyond)
         end = None
         if not beyond or only_markers and _astray(character, own, beyond, joint in tops, meshes, places):
@@ -150,7 +150,7 @@ def _moving(
             beyond = beyond if end is None else []
         if beyond and joint in carries or end is not None:
             rows[joint], free[joint] = len(rows), end
-            ends[joint] = [continued(skeleton, child, drives) for child in beyond]
+            ends[joint] = [continued(character, child, drives) for child in beyond]
     return rows, free, ends
 
 
@@ -218,12 +218,12 @@ def _before(skeleton: Skeleton, joint: int, places: np.ndarray) -> np.ndarray:
     return places[joint] - places[up]
 
 
-def _ahead(skeleton: Skeleton, joint: int, markers: list[int], places: np.ndarray) -> list[int]:
+def _ahead(character: Character, joint: int, markers: list[int], places: np.ndarray) -> list[int]:
     """The one of several joints without skin that is called an end, or lies most in the direction of the bone before: others are
     sockets.
     """
-    markers = [marker for marker in markers if says_end(skeleton.names[marker])] or markers
-    before = _before(skeleton, joint, places)
+    markers = [marker for marker in markers if says_end(character.own_names[marker])] or markers
+    before = _before(character.skeleton, joint, places)
     ways = places[markers] - places[joint]
     along = ways @ before / np.maximum(np.linalg.norm(ways, axis=1) * np.linalg.norm(before), NO_BONE**2)
     return [markers[int(np.argmax(np.where(np.linalg.norm(ways, axis=1) < NO_BONE, -2, along)))]]

@@ -91,7 +91,7 @@ class _Pieces:
 
     @classmethod
     def of(cls, character: Character, mesh: SkinnedMesh, moving: np.ndarray) -> "_Pieces":
-        faces = np.array([says_face(name) for name in character.skeleton.names])
+        faces = np.array([says_face(name) for name in character.own_names])
         number = welded_pieces(mesh.points, mesh.triangles) if len(mesh.points) else np.zeros(0, int)
         moves, outside = mesh.weight_on(moving) > LEAST_WEIGHT, mesh.weight_on(~character.of_head) > MAINLY
         driven = (outside, mesh.weight_on(faces) > MAINLY, mesh.weight_on(moving) > MAINLY)

@@ -9,6 +9,7 @@ from neuralocks_core.rig.finding import UNNAMED, left_out, of_the_body
 from neuralocks_core.rig.hair_names import says_hair_alone
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 
+from ..shot.notes import heads_above
 from ..skel.stage_rig import StageRig
 
 
@@ -24,7 +25,7 @@ def outside_notes(source: StageRig) -> list[str]:
     loose = [
         names[j]
         for j in beside
-        if says_hair_alone(names[j]) and "head" not in names[j].rpartition("/")[0].lower() and names[j] not in moved
+        if says_hair_alone(character.own_names[j]) and not heads_above(character, j) and names[j] not in moved
     ]
     if not loose:
         return []

@@ -7,6 +7,7 @@ from pathlib import Path
 from pxr import Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.anatomy.humanoid import named_head
+from neuralocks_core.anatomy.joint_names import own_names
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.hair_names import says_hair, says_hair_alone
 
@@ -55,12 +56,11 @@ def has_hair_joints(prim: Usd.Prim) -> bool:
     joints = UsdSkel.Skeleton(prim).GetJointsAttr()
     with suppress(NeuralocksError):  # errors in them are reported when the skeleton is read
         names = as_names(joints, joints.Get())
-        if any(map(says_hair_alone, names)):
-            return True
+        head = named_head(names)
+        own = own_names(names, None if head is None else names.index(head))
         # A tail is hair only below a head.
-        doubtful = [name for name in names if says_hair(name)]
-        head = named_head(names) if doubtful else None
-        return head is not None and any(name.startswith(f"{head}/") for name in doubtful)
+        below = [head is not None and name.startswith(f"{head}/") for name in names]
+        return any(says_hair_alone(name) or says_hair(name) and inside for name, inside in zip(own, below))
     return False
 
 

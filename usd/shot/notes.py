@@ -11,7 +11,7 @@ from pxr import Usd, UsdGeom
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.boundary import joints_read
 from neuralocks_core.boundary_spec import POSE_JOINTS
-from neuralocks_core.character import HEAD_WIDTHS
+from neuralocks_core.character import HEAD_WIDTHS, Character
 from neuralocks_core.rig.hair_names import says_hair
 from neuralocks_core.rotation import flat
 from neuralocks_core.stepped import Stepped
@@ -188,16 +188,23 @@ def unlikely_head(rig: StageRig) -> list[str]:
 
 def another_head(rig: StageRig) -> list[str]:
     """The note on hair joints of a second character in the skeleton, if no bake moves them."""
-    names, head, moved = rig.source.names, rig.character.head, rig.source.baked_hair
-    for joint in np.flatnonzero(~rig.character.skeleton.below(head)):
-        *above, own = names[joint].split("/")
-        heads = [name for name in above if "head" in name.lower()]
-        if heads and says_hair(own) and names[joint] not in moved:
+    names, character, moved = rig.source.names, rig.character, rig.source.baked_hair
+    for joint in np.flatnonzero(~character.skeleton.below(character.head)):
+        heads = heads_above(character, joint)
+        if heads and says_hair(character.own_names[joint]) and names[joint] not in moved:
             return [
-                f"{rig.path}: '{own}' hangs from '{heads[-1]}', not from '{leaf(names[head])}', so it is not moved; "
-                f"take that head with --head {heads[-1]}"
+                f"{rig.path}: '{leaf(names[joint])}' hangs from '{heads[0]}', not from '{leaf(names[character.head])}', so it is not "
+                f"moved; take that head with --head {heads[0]}"
             ]
     return []
+
+
+def heads_above(character: Character, joint: int) -> list[str]:
+    """Names of the joints above one that are named like a head, the nearest first."""
+    names, parents, found = character.skeleton.names, character.skeleton.parents, []
+    while (joint := int(parents[joint])) >= 0:
+        found += [leaf(names[joint])] if "head" in character.own_names[joint].lower() else []
+    return found
 
 
 def without_turn(rig: StageRig, pose_joints=POSE_JOINTS) -> list[str]:

@@ -110,6 +110,8 @@ def test_the_documents_show_how_python_turns_one_or_many():
         (["hips", "hips/neck", "hips/neck/kopf", "hips/neck/kopf/fringe_1"], True),
         (["hips", "hips/chest", "hips/chest/fringe_1", "hips/chest/neck", "hips/chest/neck/kopf"], False),
         (["hips", "hips/ponytail_1"], True),
+        (["Pony_hips", "Pony_hips/Pony_neck", "Pony_hips/Pony_neck/Pony_head"], False),
+        (["Hat_neck", "Hat_neck/Hat_head", "Hat_neck/Hat_head/Hat_tail_1"], True),
     ],
 )
 def test_what_hangs_from_the_head_is_hair_whatever_the_head_is_called(joints, hairy):

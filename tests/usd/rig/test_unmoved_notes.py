@@ -46,6 +46,22 @@ def test_hair_that_hangs_beside_the_head_is_told(edited, tmp_path, above, lock, 
         assert [note for note in notes if " not moved; " in note] == ([f"/Who/Rig: {told}"] if told else [])
 
 
+def test_no_joint_is_told_because_of_the_rigs_name(edited):
+    """`Pony` means hair wherever a joint hangs."""
+    joints = (
+        "hips",
+        "hips/neck",
+        "hips/neck/head",
+        "hips/neck/head/hair_0",
+        "hips/neck/coat",
+        "hips/neck/head/hair_0/end",
+    )
+    shot = edited(_named(*("/".join(f"Pony_{part}" for part in joint.split("/")) for joint in joints)))
+    hair = read_rigged_hair(shot)
+    assert hair.rig.chains.names == ("Pony_hair_0",)
+    assert not any(" not moved; " in note for note in rigged_notes(hair.source))
+
+
 def test_a_joint_beside_the_head_that_moves_nothing_is_not_told(edited):
     head = "hips/neck/head"
     shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{head}/hair_0/end", "hips/neck/pony"))
