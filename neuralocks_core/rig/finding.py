@@ -9,7 +9,7 @@ from neuralocks_core.anatomy.joint_names import carrier, leaf
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.hair_names import says_face, says_hair, says_hair_alone
+from neuralocks_core.rig.hair_names import says_face, says_feature, says_hair, says_hair_alone
 from neuralocks_core.rig.measuring import measured_chains
 from neuralocks_core.rig.riding import continued, driving, riders
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
@@ -85,31 +85,47 @@ def left_out(
     character: Character, meshes: list[SkinnedMesh], chains: HairChains | None = None, least: int = UNNAMED
 ) -> list[int]:
     """First joints of chains below the head that may be hair but are not moved: their names say nothing, and they are in a mesh
-    that the body drives, too.
+    that the body drives, too, or single joints in one of found chains; or names say what a face has or wears, such as a beard.
 
     Args:
         character: skeleton and head.
         meshes: the skinned meshes.
         chains: the found ones; None if there are none.
-        least: least number of joints in a row that drive skin.
+        least: least number of joints in a row that drive skin, except in a mesh of found chains.
     """
     skeleton, found = character.skeleton, []
-    drives = driving(skeleton, meshes)
-    face = np.array([says_face(name) for name in character.own_names])
+    drives, body = driving(skeleton, meshes), of_the_body(character, meshes)
+    face, feature = (np.array([says(name) for name in character.own_names]) for says in (says_face, says_feature))
     tops = [] if chains is None else chains.joints[chains.roots]
     moved = np.any([np.zeros(len(face), bool), *map(skeleton.below, tops)], axis=0)
+    beside = _beside(skeleton, meshes, moved) & ~body
 
     def in_a_row(joint: int) -> int:
         return int(drives[joint]) + max(map(in_a_row, skeleton.children[joint]), default=0)
 
-    todo = _children(character)
+    def may_be_hair(joint: int, worn: bool) -> bool:
+        tree = skeleton.below(joint)
+        if not drives[joint] or moved[tree].any() or worn and not face[joint]:
+            return False
+        if face[tree].any():
+            return in_a_row(joint) >= UNNAMED and not (feature | body)[tree].any()
+        return in_a_row(joint) >= least or beside[joint] and not _is_cap(character, joint, meshes)
+
+    # Below a jaw or a hat, only names tell.
+    todo = [(joint, False) for joint in _children(character)]
     while todo:
-        joint = todo.pop(0)
-        if not face[joint] and drives[joint] and not ((face | moved) & skeleton.below(joint)).any():
-            found += [joint] if in_a_row(joint) >= least else []
-        elif not face[joint] and not moved[joint]:
-            todo += skeleton.children[joint]
+        joint, worn = todo.pop()
+        if may_be_hair(joint, worn):
+            found.append(joint)
+        elif not moved[joint]:
+            todo += [(child, worn or face[joint]) for child in skeleton.children[joint]]
     return sorted(found)
+
+
+def _beside(skeleton: Skeleton, meshes: list[SkinnedMesh], joints: np.ndarray) -> np.ndarray:
+    """Which joints (J,) bool drive a mesh that one of some joints (J,) bool drives."""
+    every = [mesh.driven_by(len(skeleton.names)) for mesh in meshes]
+    return np.any([np.zeros(len(joints), bool), *(drives for drives in every if drives[joints].any())], axis=0)
 
 
 def of_the_body(character: Character, meshes: list[SkinnedMesh] | None) -> np.ndarray:
@@ -176,7 +192,7 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
     names, children = character.own_names, skeleton.children
     used, body = driving(skeleton, meshes), of_the_body(character, meshes)
     least = 2 if _has_leaf_bones(character, used) else 1
-    tops, todo = [], [(joint, False) for joint in _children(character)]
+    tops, short, todo = [], [], [(joint, False) for joint in _children(character)]
     while todo:
         joint, worn = todo.pop()
         tree = np.flatnonzero(skeleton.below(joint))
@@ -191,13 +207,18 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
         if (not used[joint] and below and not steered) if meshes else len(below) > 1:
             todo += below
             continue
-        strange = len(tree) > least and meshes and not body[tree].any() and not any(says_face(names[j]) for j in tree)
+        strange = meshes and len(tree) > 1 and not body[tree].any() and not any(says_face(names[j]) for j in tree)
         holds = bool(meshes) and (_is_cap(character, joint, meshes) or _only_shares(skeleton, joint, used, meshes))
         if not hair and (worn or not strange) or holds:
             todo += below
-        else:
+        elif hair or len(tree) > least:
             tops.append(joint)
-    return tops
+        else:
+            short.append(joint)
+    found = np.any([np.zeros(len(names), bool), *map(skeleton.below, tops)], axis=0)
+    # An end joint that every bone has tells nothing, but hair's own mesh does.
+    beside = _beside(skeleton, meshes or [], found)
+    return tops + [joint for joint in short if beside[skeleton.below(joint)].any()]
 
 
 def _has_leaf_bones(character: Character, used: np.ndarray) -> bool:

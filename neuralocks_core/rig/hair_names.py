@@ -15,11 +15,15 @@ _HAIR = f"{_HAIR_ALONE}|bang(?!le)|fringe|tress|strand|kami|dread|bun(?!ny)|wig(
 _HAIR_OR_FACE = "lock(?!et)|curl"
 """Words that also fit features: lips and tongues curl."""
 _FEATURES = "(?:left|right)?eye|lid|brow(?!n)|jaw|tongue|teeth|tooth|lip|mouth|nose|nostril|lash|oris|snout|muzzle|beak"
+_OF_FACE = (
+    f"{_FEATURES}|cheek|chin|face|facial|ear(?!ring)|temple|forehead"
+    "|pupil|iris|risorius|levator|special|orbicularis|squint|fang"
+)
+_ANIMAL = "cat$|dog$|fox$|wolf$|bunny|rabbit|neko"
+"""What has other ears."""
 _FACE = (
-    f"{_FEATURES}|cheek|chin|face|facial|ear|earring|temple|forehead"
-    "|pupil|iris|risorius|levator|special|orbicularis|squint|beard|glass|hat|crown|helmet|horn"
-    "|whisker|mo?ustache|bunny|neko"
-    "|fang|choker|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
+    f"{_OF_FACE}|earring|beard|glass|hat|crown|helmet|horn|whisker|mo?ustache|bunny|neko"
+    "|choker|sunglass|goggle|visor|monocle|spectacle|tiara|scarf|beret|turban"
     "|antenna|antler|necklace|locket|piercing|(?:cap|hood|veil|mask|halo|wing|mic)s?$"
 )
 _ORNAMENTS = "feather|flower|wreath|pendant|jewel|ornament|accessor|scrunch|barrette|(?:bow|pin|clip|bell|gem)s?$"
@@ -30,11 +34,15 @@ _HAIR_ANYWHERE = re.compile(
 )
 """They count anywhere in a name, except 发, which also begins other words and counts only at a word's end; names in
 MikuMikuDance rigs come in files with UTF-8 names."""
+_OF_FACE_ANYWHERE = (
+    "(?:elf|left|right)ears?[lr]?$|目|眼|瞳|眉|まつ毛|まつげ|睫|口|歯|牙|舌|あご|顎|(?<![猫犬狐狼兎獣])耳|鼻|頬|ほほ"
+    "|下巴|눈|턱|혀|귀"
+)
 _FACE_ANYWHERE = re.compile(
-    "(?:cat|dog|fox|wolf|elf|left|right)ears?[lr]?$|mimi(?!c)|headphone|headset|headband|headdress|headgear|headwear"
-    "|目|眼|瞳|眉|まつ毛|まつげ|睫|口|歯|牙|舌|あご|顎|耳|鼻|頬|ほほ|ひげ|髭|角"
+    f"{_OF_FACE_ANYWHERE}|(?:cat|dog|fox|wolf)ears?[lr]?$|mimi(?!c)|headphone|headset|headband|headdress|headgear|headwear"
+    "|耳|ひげ|髭|角"
     "|メガネ|めがね|帽|カチューシャ|ヘッド|ピアス|イヤリング|ティアラ|マスク|ゴーグル|かんざし|簪|冠|鈴|ミミ|みみ"
-    "|下巴|蝴蝶结|눈|턱|혀|귀|안경|모자"
+    "|蝴蝶结|안경|모자"
 )
 _WORN_IN_HAIR = re.compile(
     r"hair_?(?:pin|clip|band|tie|bow|acc(?:es?|essor(?:y|ies))?|ornament|deco(?:r|rations?)?|net|flower|feather|rope|ring)s?"
@@ -69,6 +77,11 @@ def says_face(name: str) -> bool:
     """Whether a joint's path or name means a part of the face, or what a head wears."""
     whole = _whole(name)
     return bool(_begins(name, f"{_FACE}|{_ORNAMENTS}") or _FACE_ANYWHERE.search(whole) or _worn_in_hair(name))
+
+
+def says_feature(name: str) -> bool:
+    """Whether a joint's path or name means a part of the face itself: no beard, no cat's ear, nor what is worn."""
+    return bool(_begins(name, _OF_FACE) and not _begins(name, _ANIMAL) or re.search(_OF_FACE_ANYWHERE, _whole(name)))
 
 
 def says_worn(name: str) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from neuralocks_core.anatomy.joint_names import carrier, leaf
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import UNNAMED, left_out, of_the_body
-from neuralocks_core.rig.hair_names import says_hair_alone
+from neuralocks_core.rig.hair_names import says_face, says_hair_alone
 from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
 
 from ..shot.notes import heads_above
@@ -66,7 +66,9 @@ def unnamed_notes(source: StageRig, meshes: list[SkinnedMesh], strands: bool) ->
         meshes: its skinned meshes in the core's axes.
         strands: its stage has hair of another kind, so that only what looks much like a chain is worth a note.
     """
+    own = source.character.own_names
     found = left_out(source.character, meshes, least=UNNAMED if strands else 1)
+    found = [joint for joint in found if not (strands and says_face(own[joint]))]
     if not found:
         return []
     first, body = leaf(source.source.names[found[0]]), of_the_body(source.character, meshes)
@@ -74,6 +76,7 @@ def unnamed_notes(source: StageRig, meshes: list[SkinnedMesh], strands: bool) ->
     if found[1:]:
         what, they = f"'{first}' and {len(found) - 1} more drive", "they are"
     why = "the body drives that mesh, too" if body[found[0]] else "it is a single joint"
+    why = "it is named like what a face has or wears" if says_face(own[found[0]]) else why
     return [
         f"{source.path}: {what} skin below the head, but no name says hair and {why}; if {they} hair, name all that is to move in "
         f"neuralocks rig inspect and rig train, with --chains {first}"

@@ -258,6 +258,19 @@ def test_end_joints_that_an_exporter_adds_make_no_hair_of_a_pipe(leaf_bones):
     assert found == (("hair_1",) if leaf_bones else ("pipe", "hair_1"))
 
 
+@pytest.mark.parametrize("named", ["hair", "cable"])
+@pytest.mark.parametrize("leaf_bones", [False, True])
+def test_a_bone_in_the_mesh_of_hair_is_hair_though_all_last_joints_have_an_end(named, leaf_bones):
+    rows = [*tail(named, 3), ("wisp", "head", (0.1, 1.6, 0)), ("wisp_end", "wisp", (0.1, 1.5, 0))]
+    if leaf_bones:
+        rows += [(f"{s}_end", f"{s}_lower_arm", (0.6 if s == "left" else -0.6, 1.4, 0)) for s in ("left", "right")]
+    who = character(rows)
+    points = np.eye(3) * 0.1 + [0, 1.6, -0.1]
+    hair = dict.fromkeys((f"{named}_1", f"{named}_2", "wisp"), points)
+    body = skin(who, dict.fromkeys(("chest", "left_lower_arm", "right_lower_arm"), points))
+    assert find_chains(who, [skin(who, hair), body]).names == (f"{named}_1", f"{named}_2", "wisp")
+
+
 def test_a_holder_of_pieces_that_do_not_go_on_from_each_other_is_no_bone():
     """The next joint's children are not at its place: a group in a group."""
     who, skins = _steered("hair", next_leaf=False)

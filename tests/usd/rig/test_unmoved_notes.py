@@ -134,6 +134,31 @@ def test_chains_of_other_names_are_told_where_none_is_found(edited, name, drives
     assert notes() == []
 
 
+def test_a_beard_is_told_where_no_hair_is_found(edited):
+    """In a stage with hair of another kind, it may be a scarf."""
+    head = "hips/head"
+    beard = [f"{head}/beard_0", f"{head}/beard_0/beard_1", f"{head}/beard_0/beard_1/beard_2"]
+
+    def change(stage):
+        _named("hips", head, *beard, f"{beard[-1]}/end")(stage)
+        UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set([2, 3, 4] * 3)
+
+    shot = edited(change)
+
+    def notes():
+        return [note for note in inspect(shot)["spoils"] if "below the head, but" in note]
+
+    (note,) = notes()
+    assert "'beard_0' drives" in note and "it is named like what a face has or wears; if it is hair" in note
+    assert len(read_rigged_hair(shot, chains=[note.rpartition("--chains ")[2]]).rig.chains) == 3
+    stage = Usd.Stage.Open(str(shot))
+    curves = UsdGeom.BasisCurves.Define(stage, "/Who/Strands")
+    curves.CreatePointsAttr([(0, 1.6, 0), (0, 1.7, 0)])
+    curves.CreateCurveVertexCountsAttr([2])
+    stage.Save()
+    assert notes() == []
+
+
 def test_a_single_joint_that_drives_a_mesh_of_its_own_is_told(edited):
     def change(stage):
         head = "hips/head"
