@@ -30,19 +30,28 @@ def file_label(name: str) -> str:
     return label.encode()[:LONGEST].decode(errors="ignore")
 
 
+BONE = 63
+"""Bytes of the longest names of bones; Blender's own exporter keeps all of them."""
+
+
 def unique(names: list[str], made=identifier) -> list[str]:
     """Identifiers of `names`, each different from all others (Blender reads only the last part of a joint path)."""
     taken: set[str] = set()
     result = []
     for name in names:
-        base = made(name)[:58]
-        candidate, number = base, 1
+        base = made(name)
+        candidate, number = _cut(base), 1
         while candidate in taken:
             number += 1
-            candidate = f"{base}_{number}"
+            candidate = _cut(base, f"_{number}")
         taken.add(candidate)
         result.append(candidate)
     return result
+
+
+def _cut(name: str, end: str = "") -> str:
+    """A name with this end, in as many bytes as a bone's may have."""
+    return name.encode()[: BONE - len(end)].decode(errors="ignore") + end
 
 
 def joint_paths(bones: list[str], parents: list[int]) -> list[str]:

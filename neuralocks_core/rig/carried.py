@@ -7,6 +7,7 @@ import numpy as np
 
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
+from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import RigModel, RigSampler
 from neuralocks_core.rotation import angle_between, flat, rotation_part, volumes
 from neuralocks_core.wind import Wind
@@ -52,6 +53,35 @@ class CarriedHair:
         for rows, sampler in self._parts:
             result[:, rows] = self.model.evaluate(sampler.features(times, strength, joints, wind))[:, rows]
         return result
+
+
+def moved_between(chains: HairChains, character: Character, clip: Clip) -> list[int]:
+    """Joints between two of a chain, such as offsets, that turn or shift in a clip on what carries them, ascending. Hair moves with
+    them besides its own turns, which know nothing of that.
+
+    Args:
+        chains: whose `joints` are those of the character.
+        character: skeleton and head.
+        clip: its motion.
+    """
+    above, found = character.skeleton.parents, set()
+    for joint, parent in zip(chains.joints, chains.parents):
+        up = int(above[joint])
+        while parent >= 0 and up != chains.joints[parent]:
+            found.add(up)
+            up = int(above[up])
+    return [joint for joint in sorted(found) if _moves_on(clip.joints[:, [above[joint], joint]])]
+
+
+def _moves_on(joints: np.ndarray) -> bool:
+    """Whether the second of two joints (T, 2, 4, 4) ever leaves its first place on the first; unknown without a readable rotation."""
+    linear = joints[..., :3, :3]
+    if flat(linear).any() or (volumes(linear) <= 0).any():
+        return False
+    local = np.linalg.inv(joints[:, 0]) @ joints[:, 1]
+    turn = angle_between(rotation_part(local, "animation"), rotation_part(local[:1], "animation"))
+    shift = np.linalg.norm(local[:, :3, 3] - local[0, :3, 3], axis=1)
+    return bool(turn.max() > TURNED or shift.max() > SHIFTED)
 
 
 def _carried_by(character: Character, joint: int) -> Character:

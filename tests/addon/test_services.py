@@ -41,8 +41,14 @@ def test_joint_paths_are_unique_and_accepted_by_usd():
     assert paths == ["a_b", "a_b/a_b_2", "a_b/_1c", "a_b/a_b_2/ä_", "a_b/a_b_2/_"]
     assert all(Sdf.Path.IsValidPathString(path) for path in paths)
     assert names.unique(["Hair_ä"]) == ["Hair__"]  # a prim
-    long = names.unique(["x" * 90, "x" * 90])
-    assert len(set(long)) == 2 and max(map(len, long)) < 63
+
+
+def test_names_are_as_long_as_those_of_blenders_bones():
+    """63 bytes, which Blender's own exporter keeps; the ends tell such names apart."""
+    bones = [f"{'Hero_Rig_Hair_Back_Left_Strand_A_':x<61}{number:02d}" for number in (1, 2)] + ["髪" * 21]
+    assert [path.split("/")[-1] for path in names.joint_paths(bones, [-1, 0, 1])] == bones
+    long = names.unique(["x" * 90, "x" * 90, "髪" * 30, "髪" * 30], names.joint_identifier)
+    assert len(set(long)) == 4 and max(len(name.encode()) for name in long) <= 63
 
 
 def test_a_rig_with_japanese_names_is_read_by_them():

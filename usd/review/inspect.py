@@ -16,7 +16,7 @@ from ..border.damage import names_damage
 from ..border.stage_files import OTHERS, USD, open_stage
 from ..border.units import Border
 from ..rig.facing import askew_notes
-from ..rig.notes import RIG_JOINTS, mirrored_notes, weight_notes
+from ..rig.notes import RIG_JOINTS, mirrored_notes, offset_notes, weight_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import check_authored, check_orients, core_meshes, describe_chains, is_baked, of_bake
 from ..rig.uneven import names_uneven_prims
@@ -161,7 +161,7 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
         spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
     spoils += weight_notes(rig) + askew_notes(rig) + outside_notes(rig) + mirrored_notes(rig, chains)
-    spoils += left_out_notes(rig, meshes, chains)
+    spoils += offset_notes(rig, chains) + left_out_notes(rig, meshes, chains)
     return describe_chains(chains)
 
 

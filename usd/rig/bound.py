@@ -20,7 +20,7 @@ from ..shot.stage import check_frames_named, frame_range
 from ..skel.old_copy import outdated_note
 from ..skel.rig_copy import outdated_of
 from .layer import kept_hair
-from .notes import mirrored_notes, rigged_notes
+from .notes import mirrored_notes, offset_notes, rigged_notes
 from .stage import RiggedHair
 
 STILL = 1e-4
@@ -119,6 +119,7 @@ class BoundHair:
             *_name_notes(rig.source),
             *([outdated_note(rig.source, self.outdated)] if self.outdated else []),
             *mirrored_notes(rig, self.hair.rig.chains),
+            *offset_notes(rig, self.hair.rig.chains),
             *(rig.loop_notes(self.wanted, self.joints) if loop else []),
             *(on_twos(rig, read) if self.model.dynamic else []),
             *(rig.cut_notes(loop) if (loop or find_cuts) and self.model.dynamic else []),

@@ -5,6 +5,7 @@ import numpy as np
 from pxr import UsdSkel
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.rig.carried import moved_between
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import rig_spec
 
@@ -70,3 +71,14 @@ def mirrored_notes(source: StageRig, chains: HairChains) -> list[str]:
         return []
     name = leaf(source.source.names[joints[np.argmax(flipped)]])
     return [f"{source.path}: hair joint '{name}' is mirrored by its animation; remove the negative scale"]
+
+
+def offset_notes(source: StageRig, chains: HairChains) -> list[str]:
+    """The note on joints between hair joints that the animation moves, since hair then moves with them besides its turns."""
+    found = [leaf(source.source.names[joint]) for joint in moved_between(chains, source.character, source.clip)]
+    if not found:
+        return []
+    what, they = f"'{found[0]}' is animated and moves", "its keys"
+    if found[1:]:
+        what, they = f"'{found[0]}' and {len(found) - 1} more are animated and move", "their keys"
+    return [f"{source.path}: {what} hair besides the network; clear {they} unless that is wanted"]

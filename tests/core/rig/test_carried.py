@@ -8,9 +8,9 @@ from neuralocks_core.character import Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import RigSampler, find_chains, rig_spec
-from neuralocks_core.rig.carried import CarriedHair
+from neuralocks_core.rig.carried import CarriedHair, moved_between
 from neuralocks_core.rotation import from_vector
-from tests.core.rig.builders import character, tail
+from tests.core.rig.builders import character, skin, tail
 from tests.rig_models import random_rig_model
 
 TIMES = np.linspace(0, 2, 61)
@@ -87,3 +87,23 @@ def test_a_negative_strength_is_refused_as_a_bake_does():
     carried = CarriedHair(model, model.chains.joints, who, clip(who.skeleton, "head", NODDING, "head"))
     with pytest.raises(NeuralocksError, match="strength -1.0: give a number of at least 0, 0 for the held pose"):
         carried.turns(TIMES, strength=-1.0)
+
+
+@pytest.mark.parametrize("how", ["turn", "shift", "still", "bent"])
+def test_offsets_between_hair_joints_that_move_are_found(how):
+    """Not joints that hair itself moves, a carrier above it, nor an offset that is held elsewhere than in the bind pose."""
+    at = {name: place for name, _, place in tail("hair", 4)}
+    rows = [("hat", "head", (0, 1.7, 0)), ("hair_1", "hat", at["hair_1"]), ("off", "hair_1", at["hair_2"])]
+    rows += [("hair_2", "off", at["hair_2"]), ("hair_3", "hair_2", at["hair_3"]), ("hair_4", "hair_3", at["hair_4"])]
+    who = character(rows)
+    points = np.eye(3) * 0.02 + [0, 1.5, -0.1]
+    chains = find_chains(who, [skin(who, dict.fromkeys(("hair_1", "hair_2", "hair_3"), points))])
+    assert chains.names == ("hair_1", "hair_2", "hair_3")
+    off = [name.rsplit("/", 1)[-1] for name in who.skeleton.names].index("off")
+    turned = {"turn": NODDING, "bent": np.full((len(TIMES), 3), 0.3)}.get(how, 0 * NODDING)
+    motion = clip(who.skeleton, "off", turned, "off")
+    motion.joints[20:, who.skeleton.below(off), 1, 3] += 0.05 * (how == "shift")
+    for joint in ("hat", "hair_3"):
+        move = clip(who.skeleton, joint, NODDING, "head").joints @ who.inverse_bind
+        motion.joints[:] = move @ motion.joints
+    assert moved_between(chains, who, motion) == ([off] if how in ("turn", "shift") else [])
