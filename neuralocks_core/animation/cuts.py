@@ -11,7 +11,7 @@ JUMP = 0.4
 put the joint: in 1/24 s, that takes 23 g."""
 _TURN = np.radians(72.0)
 """The same for the joint's rotation [rad]."""
-_LONGEST = 0.1
+LONGEST = 0.1
 """Longer steps [s] are not cuts: in that time people can get anywhere."""
 APART = 0.2
 """Steps closer together than this [s] are not cuts, but motion too fast for its rate, or stepped animation."""
@@ -56,7 +56,7 @@ def _jumps(clip: Clip, joint: int) -> tuple[np.ndarray, np.ndarray]:
     fling = np.tile(angle, (2, 1))
     fling[0, 1:] = angle[1:] - angle[:-1] * span[1:] / span[:-1]
     fling[1, :-1] = angle[:-1] - angle[1:] * span[:-1] / span[1:]
-    jumped = ((unlike.min(axis=0) > JUMP) | (fling.min(axis=0) > _TURN)) & (span < _LONGEST)
+    jumped = ((unlike.min(axis=0) > JUMP) | (fling.min(axis=0) > _TURN)) & (span < LONGEST)
     found = np.flatnonzero(jumped)
     crowded = np.diff(times[1:][found]) < APART
     alone = np.ones(len(found), bool)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from neuralocks_core.animation.cuts import APART, find_cuts, find_flashes
+from neuralocks_core.animation.reference_pose import reference_end
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
@@ -128,8 +129,8 @@ class StageRig:
         return notes
 
     def cut_notes(self, loop: bool = False) -> list[str]:
-        """Notes on where the hair starts anew, and where it does not although the head jumps; for a loop, in which it never does,
-        on where it should.
+        """Notes on where the hair starts anew, and where it does not although the head jumps, or leaps out of a reference pose; for a
+        loop, in which it never does, on where it should.
         """
         if "head" not in self.character.humanoid:
             return []
@@ -148,7 +149,19 @@ class StageRig:
                 f"{self.path}: its head jumps at {self._named(flashes)}, less than {APART:g} s from one jump to the next, so these "
                 f"are not taken as cuts and the hair is flung; repair the animation, or name them all if they are (--cuts {every})"
             )
-        return notes
+        return notes if loop else [*notes, *self._reference_note(np.union1d(cuts, flashes), cuts)]
+
+    def _reference_note(self, told: np.ndarray, cuts: np.ndarray) -> list[str]:
+        """The note on a reference pose in the first samples, unless the jump from there is told already."""
+        rest = self._to_world @ self.source.at_rest @ self._trim
+        end = reference_end(self.clip, self.character, [self.character.skeleton.bind, rest])
+        if end is None or np.isclose(told, end).any():
+            return []
+        every = self._named(np.union1d(cuts, [end]), most=100)
+        return [
+            f"{self.path}: its animation begins with the bind or rest pose and leaps to another at {self._named(np.array([end]))}, which "
+            f"flings the hair; if the first pose is only a reference, let the hair start anew there (--cuts {every})"
+        ]
 
     def _named(self, times: np.ndarray, most: int = 8) -> str:
         """The time codes of samples of the clip [s], as `--cuts` takes them."""
