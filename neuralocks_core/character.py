@@ -10,7 +10,7 @@ from neuralocks_core.anatomy.humanoid import Humanoid, copies, find_humanoid
 from neuralocks_core.anatomy.joint_names import own_names
 from neuralocks_core.anatomy.own_skin import own_skin
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import inverse, rotation_part, sizes, transformed
+from neuralocks_core.rotation import inverse, rotation_part, transformed
 from neuralocks_core.skinned_body import Body
 
 HEAD_WIDTHS = (0.08, 0.6)
@@ -78,19 +78,6 @@ def levels(parents: np.ndarray) -> list[np.ndarray]:
     for joint, parent in enumerate(parents):
         depth[joint] = depth[parent] + 1 if parent >= 0 else 0
     return [np.flatnonzero(depth == level) for level in range(depth.max(initial=-1) + 1)]
-
-
-def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
-    """Signed scales (n,) of what a joint carries in some samples of an animation; 1 is the size in the bind pose.
-
-    A character is measured, and the network reads its hair, at their median: a rig may draw its head twice as large as in the
-    bind pose, and hair twice as long moves differently.
-
-    Args:
-        posed: (T, 4, 4) transforms of the joint; bind: (4, 4) in the bind pose.
-    """
-    few = np.unique(np.linspace(0, len(posed) - 1, 16).astype(int))
-    return sizes(posed[few] @ np.linalg.inv(bind))
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,6 +92,19 @@ def sizes(transforms: np.ndarray) -> np.ndarray:
     return np.cbrt(volumes(np.asarray(transforms, float)[..., :3, :3]))
 
 
+def sizes_shown(posed: np.ndarray, bind: np.ndarray) -> np.ndarray:
+    """Signed scales (n,) of what a joint carries in some samples of an animation; 1 is the size in the bind pose.
+
+    A character is measured, and the network reads its hair, at their median: a rig may draw its head twice as large as in the
+    bind pose, and hair twice as long moves differently.
+
+    Args:
+        posed: (T, 4, 4) transforms of the joint; bind: (4, 4) in the bind pose.
+    """
+    few = np.unique(np.linspace(0, len(posed) - 1, 16).astype(int))
+    return sizes(posed[few] @ np.linalg.inv(bind))
+
+
 def volumes(linear: np.ndarray) -> np.ndarray:
     """Determinants (...) of matrices (..., 3, 3), written out: an LU decomposition of each takes four times as long."""
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(np.asarray(linear, float), (-2, -1), (0, 1))

@@ -11,11 +11,11 @@ import numpy as np
 
 from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
 from neuralocks_core.anatomy.standing import standing
-from neuralocks_core.character import Character, Skeleton, sizes_shown
+from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.mesh import inside_out
-from neuralocks_core.rotation import transformed
+from neuralocks_core.rotation import sizes_shown, transformed
 from neuralocks_core.skinned_body import Body
 
 from . import names

@@ -6,9 +6,8 @@ from pxr import UsdGeom
 
 from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.anatomy.standing import standing
-from neuralocks_core.character import sizes_shown
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.rotation import inverses, sizes
+from neuralocks_core.rotation import inverses, sizes, sizes_shown
 
 from ..border.placement import Placement
 from ..border.units import Border
