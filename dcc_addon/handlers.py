@@ -10,7 +10,7 @@ from . import background, live, model_updates
 from .live_strands import live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
 from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
-from .scene import blur
+from .scene import blur, named_from
 from .scene.appended import remake
 from .scene.attach import switch_changed
 from .scene.last_called import go_last, others_called
@@ -83,6 +83,7 @@ def on_load(*_):
         session.opened = {scene.name_full: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
     model_updates.compare()
     make_comparable(bpy.data.objects)
+    named_from.remember(bpy.data.objects, SETTING.values())
     own = lively(bpy.data.objects)
     if own.hairs or own.armatures:
         lock()
@@ -113,6 +114,7 @@ def before_save(target=None, *_):
         live.show_rest(scene)
     show_all_rest()
     session.remade = _unseen(lambda: Remade(target or bpy.data.filepath, SETTING.values()))
+    named_from.forget(SETTING.values())
 
 
 @persistent
@@ -120,6 +122,7 @@ def after_save(*_):
     """Continue as before the save, in all scenes; last in the one shown, because hair may be in several."""
     if session.remade is not None:
         _unseen(session.remade.put_back)
+    named_from.remember(bpy.data.objects, SETTING.values())
     for scene in sorted(bpy.data.scenes, key=lambda scene: scene == bpy.context.scene):
         live.refresh(scene)
 

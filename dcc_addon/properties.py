@@ -9,6 +9,8 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty,
 from neuralocks_core.wind import STRONGEST
 
 from . import background, live
+from .models import SETTING as MODELS
+from .scene import named_from
 from .scene.paths import FILE
 from .services.sliders import SLIDERS
 from .session import session
@@ -62,11 +64,13 @@ def _rig_look_changed(character, context) -> None:
 
 
 def _rig_model_changed(character, context) -> None:
+    named_from.remember([character.id_data], MODELS.values())
     session.chains.pop(character.id_data.name_full, None)
     live.refresh(context.scene)
 
 
 def _model_changed(settings, context) -> None:
+    named_from.remember([settings.id_data], MODELS.values())
     session.forget(settings.id_data.name_full)
     _look_changed(settings, context)
 
@@ -120,6 +124,7 @@ class HairSettings(bpy.types.PropertyGroup):
         **SETTING,
     )
     shipped: StringProperty(description="Checksum of the add-on's model that moved this hair when it was saved", **KEPT)
+    named_from: StringProperty(description="Folder of //, while this file is open", **KEPT)
     muted: StringProperty(description="Modifiers that are off while the hair is live, as JSON", **KEPT)
     replaced: StringProperty(description="Modifiers that are off while the hair plays a cache, as JSON", **KEPT)
 
@@ -210,14 +215,9 @@ class CharacterSettings(bpy.types.PropertyGroup):
         update=_rig_model_changed,
         **SETTING,
     )
-    rig_kept: StringProperty(
-        description="Rotations of the hair bones from before they were live, as JSON",
-        **KEPT,
-    )
-    keys_kept: StringProperty(
-        description="Rotations of the hair bones from before they were keyed, as JSON",
-        **KEPT,
-    )
+    named_from: StringProperty(description="Folder of //, while this file is open", **KEPT)
+    rig_kept: StringProperty(description="Rotations of the hair bones from before they were live, as JSON", **KEPT)
+    keys_kept: StringProperty(description="Rotations of the hair bones from before they were keyed, as JSON", **KEPT)
     keys_alone: StringProperty(
         description="How the armature's action was set before hair bones were keyed, as JSON",
         **KEPT,

@@ -26,11 +26,13 @@ def absolute(path: str, library=None) -> str:
     return full(path, library)
 
 
-def full(path: str, library=None) -> str:
-    """The same, unchecked. A path from Windows may separate folders by backslashes after the //, which are letters elsewhere."""
+def full(path: str, library=None, folder: str | None = None) -> str:
+    """The same, unchecked; from a `folder` rather than that of the library, if one is given. A path from Windows may separate folders by
+    backslashes after the //, which are letters elsewhere.
+    """
     if path.startswith("//"):
         path = path.replace("\\", "/")
-    return bpy.path.abspath(path, library=library)
+    return bpy.path.abspath(path, start=folder, library=None if folder else library)
 
 
 def usual_output() -> str:

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that is copied and pasted."""
+
+import shutil
+from pathlib import Path
+
+import bpy
+
+from tests.blender import scenes
+from tests.blender.checks import MODEL
+
+
+def pasted(folder: Path) -> None:
+    """Hair and bones that are copied name the same models where they are pasted: in their file, in another, if Blender reports what it
+    pastes there, also after their file was opened again or saved elsewhere. A file that was moved afterwards counts where it is.
+    """
+    shots, later, others, moved = (folder / name for name in ("shots", "later", "others", "moved"))
+    for each in (shots, later, others):
+        each.mkdir()
+    model = Path(shutil.copy(MODEL, shots / "mine.neuralocks"))
+    settings = bpy.context.preferences.filepaths
+    before, settings.temporary_directory = (
+        settings.temporary_directory,
+        str(folder),
+    )  # where Blender puts what is copied
+    rig = scenes.armature()
+    strands = scenes.hair(rig, 20)
+    bpy.ops.wm.save_as_mainfile(filepath=str(shots / "shot.blend"))
+    strands.neuralocks_hair.model = rig.neuralocks_character.rig_model = "//mine.neuralocks"
+    try:
+        _copied(model)
+        bpy.ops.wm.save_mainfile()
+        _copied(model)
+        bpy.ops.wm.open_mainfile(filepath=str(shots / "shot.blend"))
+        _copied(model)
+        bpy.ops.wm.save_as_mainfile(filepath=str(later / "shot.blend"))
+        assert bpy.data.objects["Hair"].neuralocks_hair.model == "//../shots/mine.neuralocks"
+        _copied(model)
+        if hasattr(bpy.app.handlers, "blend_import_post"):
+            for target in (str(others / "other.blend"), ""):
+                bpy.ops.wm.open_mainfile(filepath=str(shots / "shot.blend"))
+                _copy()
+                scenes.empty()
+                if target:
+                    bpy.ops.wm.save_as_mainfile(filepath=target)
+                assert _pasted() == [model] * 2
+    finally:
+        settings.temporary_directory = before
+    if hasattr(bpy.app.handlers, "blend_import_post"):
+        shots.rename(moved)
+        shots.mkdir()  # as if it were another shot's
+        scenes.empty()
+        with bpy.data.libraries.load(str(moved / "shot.blend")) as (_, wanted):
+            wanted.objects = ["Hair"]
+        assert _models(bpy.data.objects) == [moved / "mine.neuralocks"] * 2
+
+
+def _copied(model: Path) -> None:
+    """Copy what is in the file, and paste it there: all of it names the model."""
+    _copy()
+    assert _pasted() == [model] * 2 == _models(bpy.data.objects)[:2]
+    for thing in list(bpy.context.selected_objects):
+        bpy.data.objects.remove(thing)
+
+
+def _copy() -> None:
+    for thing in bpy.context.scene.objects:
+        thing.select_set(True)
+    assert bpy.ops.view3d.copybuffer() == {"FINISHED"}
+
+
+def _pasted() -> list[Path]:
+    """The models that what is pasted names."""
+    assert bpy.ops.view3d.pastebuffer() == {"FINISHED"}
+    return _models(bpy.context.selected_objects)
+
+
+def _models(things) -> list[Path]:
+    from dcc_addon.models import model_path
+
+    kinds = {"CURVES": "strands", "ARMATURE": "rig"}
+    return [Path(model_path(thing, kinds[thing.type])).resolve() for thing in things]
