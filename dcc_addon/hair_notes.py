@@ -4,15 +4,15 @@
 from neuralocks_core.model import kind_known
 
 from .model_updates import NOTE
-from .scene import as_groomed, cached_strands, imported
+from .scene import as_groomed, cached_strands, imported, recorded
 from .scene.attach import has_cache
 from .scene.muting import off_meanwhile
 from .scene.riding import on_hair_bone
 from .session import session
 
 
-def hair_notes(hair) -> list[str]:
-    """The notes on a hair object as it is now."""
+def hair_notes(hair, scene) -> list[str]:
+    """The notes on a hair object of a scene as it is now."""
     own, prepared, found = hair.neuralocks_hair, session.hairs.get(hair.name_full), []
     if prepared is not None:
         if fact := prepared.hair.another_body:
@@ -26,9 +26,8 @@ def hair_notes(hair) -> list[str]:
         found.append(NOTE)
     if has_cache(hair) and cached_strands.changed(hair.data):
         found.append("Its strands were changed since the bake, so its cache is off; press Bake and Attach again")
-    elif has_cache(hair) and not own.live and (parts := as_groomed.changed(hair)):
-        what = ", ".join(parts)
-        found.append(f"Changed since the bake, which shows it as it was: {what}; press Bake and Attach again")
+    elif has_cache(hair) and not own.live and (parts := as_groomed.changed(hair, scene)):
+        found.append(recorded.note(parts, "Bake and Attach"))
     if off := off_meanwhile(hair):
         found.append(f"Off while Live, or the hair would move twice: {', '.join(off)}")
     if not own.live and (problem := on_hair_bone(hair)):  # while it is live, that is an error

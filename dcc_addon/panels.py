@@ -153,7 +153,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             done = session.preparing[hair.name_full][0].done
             progress(layout, done, f"Preparing {100 * done:.0f} %, Live cancels")
         message(layout, hair.name_full)
-        for text in hair_notes(hair):
+        for text in hair_notes(hair, context.scene):
             words(layout, text, "INFO")
         if own.armature is not None and imported.has_file(hair):
             layout.operator("neuralocks.rest_from_file", icon="IMPORT")

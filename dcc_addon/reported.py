@@ -8,6 +8,7 @@ import bpy
 from . import background
 from .edited import touched
 from .live_strands import EDITING, known
+from .scene import body_known
 from .scene.keyed import concerns, users_of
 from .scene.lookup import find
 from .scene.shapes import follows
@@ -15,7 +16,9 @@ from .session import session
 
 
 def forget_data(changed) -> None:
-    """Weights of meshes, and points of grooms, that were edited are read again."""
+    """Weights and shapes of meshes, and points of grooms, that were edited are read again."""
+    meshes = [thing.name_full for thing in changed if isinstance(thing, bpy.types.Mesh)]
+    body_known.edited(meshes, keys=any(isinstance(thing, bpy.types.Action) for thing in changed))
     for thing in changed:
         if isinstance(thing, bpy.types.Mesh):
             session.weights.pop(thing.name_full, None)

@@ -122,6 +122,12 @@ class Session:
     """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
     grooms: dict[str, int] = field(default_factory=dict)
     """A number of the rest points of each groom that plays a cache, by the name of its Curves; dropped when these are edited."""
+    heads: dict[str, tuple[tuple, str]] = field(default_factory=dict)
+    """The head bone of armatures, by name, and what it was found by; see `scene.as_carried`."""
+    bodies: dict[tuple, int] = field(default_factory=dict)
+    """A number of the bodies of an armature in a scene; dropped when anything is edited. See `scene.body_known`."""
+    surfaces: dict[str, int] = field(default_factory=dict)
+    """A number of each of these body meshes, by mesh name; dropped when it, or an action, is edited."""
     vertices: dict[str, int] = field(default_factory=dict)
     """A number of the vertices of each body mesh as they were read last, by mesh name."""
     messages: dict[str, str] = field(default_factory=dict)
@@ -169,6 +175,8 @@ class Session:
         self.stop_preparing_all()
         self.weights.clear()
         self.grooms.clear()
+        self.bodies.clear()
+        self.surfaces.clear()
         self.chains.clear()
 
     def forget(self, name: str) -> None:

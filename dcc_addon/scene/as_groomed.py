@@ -1,26 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What hair was when its cache was baked, stored with its object: the groom, its place, and what the panel sets. A cache goes on showing
-these as they were.
+"""What hair was when its cache was baked, stored with its object: the groom, its place, what the panel sets, and the bodies that it is
+kept out of. A cache goes on showing these as they were.
 """
 
 import zlib
 
 from ..services.sliders import SLIDERS
-from ..services.wind import Blowing
 from ..session import session
+from . import as_carried, body_known, recorded
 from .animated import animated
 from .curves import points
 from .rigging import hangs, stands
 
 KEY = "neuralocks_groomed"
-"""The property of the object: a number for each of PARTS."""
-PARTS = ("groom", "place", "sliders", "wind")
+"""The property of the object: a number for each part."""
+FEWEST = 4
+"""Parts that every record has."""
 
 
-def remember(hair) -> None:
-    """Note what the hair is, unless it belongs to another file."""
+def remember(hair, scene) -> None:
+    """Note what the hair is in a scene, unless it belongs to another file."""
     if hair.library is None:
-        hair[KEY] = " ".join(_numbers(hair))
+        hair[KEY] = recorded.as_text(_numbers(hair, scene))
 
 
 def forget(hair) -> None:
@@ -29,21 +30,22 @@ def forget(hair) -> None:
         hair.pop(KEY, None)
 
 
-def changed(hair) -> list[str]:
-    """Which of PARTS were changed since the cache was baked; none if that is unknown."""
-    told = str(hair.get(KEY, "")).split(" ")
-    if len(told) != len(PARTS):
-        return []
-    return [part for part, then, now in zip(PARTS, told, _numbers(hair), strict=True) if then != now]
+def changed(hair, scene) -> list[str]:
+    """What was changed since the cache was baked; nothing if that is unknown."""
+    return recorded.changed(hair.get(KEY, ""), _numbers(hair, scene), FEWEST)
 
 
-def _numbers(hair) -> list[str]:
+def _numbers(hair, scene) -> dict[str, int]:
     own, moving = hair.neuralocks_hair, animated(hair.animation_data)
     set_so = [round(getattr(own, s.name), 6) for s in SLIDERS if f"neuralocks_hair.{s.name}" not in moving]
-    air = own.armature and own.armature.neuralocks_character
-    blown = Blowing.of(air.wind, air.wind_direction, air.gusts) if air else Blowing()
-    found = [*hangs(hair), *stands(hair, moving)], [*set_so, own.resolve, own.model], blown
-    return [f"{number:08x}" for number in (_number_of(hair.data), *(zlib.crc32(repr(each).encode()) for each in found))]
+    return {
+        "groom": _number_of(hair.data),
+        "place": recorded.number_of([*hangs(hair), *stands(hair, moving)]),
+        "sliders": recorded.number_of([*set_so, own.resolve, own.model]),
+        "wind": as_carried.wind(own.armature),
+        **as_carried.others(own.armature, scene),
+        "body": body_known.number_of_bodies(own.armature, scene) if own.armature else 0,
+    }
 
 
 def _number_of(data) -> int:

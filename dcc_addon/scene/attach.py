@@ -198,7 +198,7 @@ def _cache_file(path: str):
 
 
 def _remember(hair, cache, scene, frames: tuple[int, int]) -> None:
-    as_groomed.remember(hair)
+    as_groomed.remember(hair, scene)
     if hair.neuralocks_hair.armature is not None:
         path = _place(cache)
         session.baked[path] = as_baked.remember(cache, hair.neuralocks_hair.armature, scene, frames, path)

@@ -50,7 +50,7 @@ def unreported(body) -> int:
     """
     keys = body.data.shape_keys
     curves = curves_of(keys.animation_data) if keys else ()
-    found = [*shape(body), *((curve.data_path, _points(curve)) for curve in curves), weighed_so(body)]
+    found = [*shape(body), *((curve.data_path, number_of_keys(curve)) for curve in curves), weighed_so(body)]
     return zlib.crc32(repr(found).encode())
 
 
@@ -90,6 +90,14 @@ def hangs(thing) -> list:
 def stands(thing, moving: set[str]) -> list:
     """An object's own place, without the paths that animation writes, `moving`."""
     return [getattr(thing, name)[:] for name in (*PLACE, *DELTA) if name not in moving]
+
+
+def number_of_keys(curve) -> int:
+    """A number of a curve's keys: a face has a hundred thousand."""
+    values = np.empty((3, 2 * len(curve.keyframe_points)), np.float32)
+    for row, name in zip(values, ("co", "handle_left", "handle_right"), strict=True):
+        curve.keyframe_points.foreach_get(name, row)
+    return zlib.crc32(values)
 
 
 def _animation(thing) -> list:
@@ -255,14 +263,6 @@ def _of_hair(curve) -> bool:
 def _keys(curve) -> list:
     modifiers = [[modifier.type, *as_set(modifier, settings_of(modifier))] for modifier in curve.modifiers]
     return [*modifiers, *((*key.co, key.interpolation) for key in curve.keyframe_points)]
-
-
-def _points(curve) -> int:
-    """A number of a curve's keys: a face has a hundred thousand."""
-    values = np.empty((3, 2 * len(curve.keyframe_points)), np.float32)
-    for row, name in zip(values, ("co", "handle_left", "handle_right"), strict=True):
-        curve.keyframe_points.foreach_get(name, row)
-    return zlib.crc32(values)
 
 
 def _quoted(named) -> str:

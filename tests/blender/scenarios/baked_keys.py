@@ -249,9 +249,11 @@ def strands_on_a_hair_bone(folder: Path) -> None:
     track.mute = True
     alike()
     assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"}
-    assert apart(points_at(strands, 9), expected) < SAME and not [note for note in hair_notes(strands) if why in note]
+    assert apart(points_at(strands, 9), expected) < SAME and not [
+        note for note in hair_notes(strands, bpy.context.scene) if why in note
+    ]
     track.mute = False
-    assert [note for note in hair_notes(strands) if why in note]
+    assert [note for note in hair_notes(strands, bpy.context.scene) if why in note]
 
 
 def tracks_deleted_by_hand(folder: Path) -> None:

@@ -29,7 +29,7 @@ def another_shipped_model(folder: Path) -> None:
         saved.extend(kept)
         assert _noted(path)
         _hair().model = str(MODEL)
-        assert NOTE not in hair_notes(bpy.data.objects["Hair"])
+        assert NOTE not in hair_notes(bpy.data.objects["Hair"], bpy.context.scene)
         _hair().model = ""
         bpy.ops.wm.save_as_mainfile(filepath=path)
         assert not _noted(path)
@@ -37,7 +37,7 @@ def another_shipped_model(folder: Path) -> None:
 
 def _noted(path: str) -> bool:
     bpy.ops.wm.open_mainfile(filepath=path)
-    return NOTE in hair_notes(bpy.data.objects["Hair"])
+    return NOTE in hair_notes(bpy.data.objects["Hair"], bpy.context.scene)
 
 
 def _hair():

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a character is set to that moves all of its hair, strands and bones alike, as numbers of a record; see `recorded`."""
+
+from neuralocks_core.errors import NeuralocksError
+
+from ..services.wind import Blowing
+from ..session import session
+from .armature import read
+from .recorded import number_of
+
+
+def wind(armature) -> int:
+    """A number of the wind in the hair of an armature, or of none."""
+    own = armature and armature.neuralocks_character
+    return number_of(Blowing.of(own.wind, own.wind_direction, own.gusts) if own else Blowing())
+
+
+def others(armature, scene) -> dict[str, int]:
+    """Numbers of everything else, by what the panels call it; of an armature in a scene, or of none."""
+    return {
+        "Loop": number_of(armature is not None and armature.neuralocks_character.loop),
+        "Head Bone": number_of(_head(armature) if armature else ""),
+        "Unit Scale": number_of(round(scene.unit_settings.scale_length, 9)),
+    }
+
+
+def _head(armature) -> str:
+    """The bone that carries the hair, chosen or found; empty if there is none. It is looked for when bones or the choice change: that
+    takes longer than a redraw may.
+    """
+    chosen = armature.neuralocks_character.head_bone
+    key, known = (tuple(armature.data.bones.keys()), chosen), session.heads.get(armature.name_full)
+    if known is None or known[0] != key:
+        try:
+            rig = read(armature, chosen)
+            found = rig.bones[rig.humanoid()["head"]]
+        except NeuralocksError:
+            found = ""
+        known = session.heads[armature.name_full] = key, found
+    return known[1]

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbers of what hair was baked of, stored with the bake as text, so that the panel can say what was changed since."""
+
+import zlib
+
+NOTE = "Changed since the bake, which shows it as it was: {what}; press {remedy} again"
+
+
+def number_of(found) -> int:
+    """A number that changes when `found` does, which is told by its text."""
+    return zlib.crc32(repr(found).encode())
+
+
+def as_text(numbers: dict[str, int]) -> str:
+    """What is stored: the numbers in their order. Parts that are added go last, so that older records can be read."""
+    return " ".join(f"{number:08x}" for number in numbers.values())
+
+
+def changed(told, now: dict[str, int], fewest: int) -> list[str]:
+    """Which parts have other numbers `now` than in `told`, which may lack the last ones; none if it has not even the `fewest`, and so
+    is something else.
+    """
+    then = str(told).split(" ")
+    if not fewest <= len(then) <= len(now):
+        return []
+    return [part for part, old, number in zip(now, then, now.values(), strict=False) if old != f"{number:08x}"]
+
+
+def note(parts: list[str], remedy: str) -> str:
+    """What the panel says of changed parts."""
+    return NOTE.format(what=", ".join(parts), remedy=remedy)
