@@ -10,7 +10,7 @@ from neuralocks_core.motion import LOOP_GAP
 from .hair_notes import hair_notes, unnamed_model
 from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
-from .scene import actions, attach, imported
+from .scene import actions, as_keyed, attach, imported
 from .scene.particles import waiting
 from .scene.paths import usual_output
 from .scene.sampled_from import begins_later, frames_of
@@ -231,8 +231,10 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         taking = row.row(align=True)
         taking.enabled = actions.has_keys(armature)
         taking.operator("neuralocks.remove_keys", text="", icon="X")
-        if text := actions.changed_since(armature, context.scene):
+        if text := as_keyed.changed_since(armature, context.scene):
             words(layout, f"{armature.name_full}: {text}", "ERROR")
+        if text := as_keyed.note(armature, context.scene):
+            words(layout, text, "INFO")
         column = layout.column(align=True)  # side by side, a sidebar of default width would cut them
         column.operator("neuralocks.export_skel", text="USD Animation", icon="EXPORT")
         column.operator("neuralocks.export_c", text="C Header", icon="FILE_SCRIPT")

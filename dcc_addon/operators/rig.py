@@ -13,7 +13,7 @@ from ..blowing import blowing, in_core
 from ..live import refresh
 from ..live_rig import bind, rest, show_rest
 from ..models import model_path
-from ..scene import actions, as_baked
+from ..scene import actions, as_keyed
 from ..scene.attach import check_own
 from ..scene.clock import stretch_of
 from ..scene.export import write_shot
@@ -82,7 +82,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         settings.rig_live = False
         rest(armature)
         action = actions.bake_keys(armature, bones.bones, (stretch * frames, turns), (stretch * every, own))
-        as_baked.remember(action, armature, scene, (first, last))
+        as_keyed.remember(action, armature, scene, (first, last))
         return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from . import alone, as_baked, rotations
+from . import alone, rotations
 from .animated import animated
 from .lookup import identified, identity
 from .relations import found_anew
@@ -139,10 +139,9 @@ def has_keys(armature) -> bool:
     return bool(armature.neuralocks_character.keys_kept) and not playing
 
 
-def changed_since(armature, scene) -> str:
-    """What was changed since hair keys that play were baked, and shows in this frame, with the remedy; empty if nothing is known to be."""
-    told = (action[as_baked.KEY] for action in _actions(armature, playing=True) if as_baked.KEY in action)
-    return as_baked.changed(next(told, None), armature, scene, "Bake to Keyframes")
+def stored(armature, key: str):
+    """What is stored under a key with hair keys that play; None if nothing is."""
+    return next((action[key] for action in _actions(armature, playing=True) if key in action), None)
 
 
 def beside_others(armature) -> bool:

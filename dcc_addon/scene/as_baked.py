@@ -47,7 +47,7 @@ def remember(block, armature, scene, frames: tuple[int, int], path: str = "") ->
         "last": int(frames[1]),
         "timing": [rate_of(scene), stretch_of(scene)],
         "heads": stood[:, :3],
-        "file": _print_of(path),
+        "file": print_of(path),
     }
     block[KEY] = told | {"heads": stood[:, :3].ravel().tolist()}
     return told
@@ -60,7 +60,7 @@ def changed(told, armature, scene, remedy: str, path: str = "") -> str:
     told = _checked(told)
     if told is None or armature is None:
         return ""
-    if _print_of(path) not in ("", told["file"]):
+    if print_of(path) not in ("", told["file"]):
         return ANOTHER.format(remedy)
     first, last, frame = told["first"], told["last"], shown_frame(scene)
     if not np.allclose(told["timing"], [rate_of(scene), stretch_of(scene)], rtol=1e-6, atol=0):
@@ -69,6 +69,15 @@ def changed(told, armature, scene, remedy: str, path: str = "") -> str:
         rendered = scene.frame_start <= frame <= scene.frame_end
         return BEYOND.format(remedy, first=first, last=last) if rendered else ""
     return MOVED.format(remedy) if _moved(told, armature, scene, frame) else ""
+
+
+def print_of(path: str) -> str:
+    """A number of a file's content; empty if there is none."""
+    try:
+        state = os.stat(path)
+        return _print(path, state.st_mtime_ns, state.st_size)
+    except OSError:
+        return ""
 
 
 def _moved(told, armature, scene, frame: float) -> bool:
@@ -95,15 +104,6 @@ def _checked(told) -> dict | None:
     except (TypeError, ValueError, LookupError, OverflowError):
         return None
     return found if found["timing"].shape == (2,) else None
-
-
-def _print_of(path: str) -> str:
-    """A number of a file's content; empty if there is none."""
-    try:
-        state = os.stat(path)
-        return _print(path, state.st_mtime_ns, state.st_size)
-    except OSError:
-        return ""
 
 
 @lru_cache(64)

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What was set otherwise since hair was baked, or of another shape: the panel names it, as long as it is so."""
+
+from pathlib import Path
+
+import bpy
+
+from tests.blender import scenes
+from tests.blender.checks import SAME, apart, bones_at, choose, give_bone_model, make_live, needs_usd
+from tests.blender.panel import drawn
+
+
+def character_set_since(folder: Path) -> None:
+    """If the Loop, Head Bone, unit scale or body of attached hair becomes another, a note says so until it is as before, also when the
+    file is opened again. An older record, which lacks these, tells of nothing but its own parts.
+    """
+    needs_usd()
+    rig, strands = scenes.dancer(20, skinned=True)
+    make_live(rig, strands)
+    body, scene = bpy.data.objects["Body"], bpy.context.scene
+    fat = _fatten(body)
+    breathing = _fatten(body, "Breath")
+    for frame in (1, 24):
+        breathing.value = frame / 24
+        breathing.keyframe_insert("value", frame=frame)
+    scene.neuralocks.output = str(folder / "hair.usdc")
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
+    strands, body, scene = (*map(bpy.data.objects.get, ("Hair", "Body")), bpy.context.scene)
+    own, mesh = strands.neuralocks_hair.armature.neuralocks_character, body.data
+    fat, (curve,) = mesh.shape_keys.key_blocks["Fat"], scenes.fcurves(mesh.shape_keys)
+    assert not _told()
+    basis = mesh.shape_keys.reference_key.data
+    slim = [point.co.copy() for point in basis]
+
+    def widen(wide: bool) -> None:
+        for point, before in zip(basis, slim, strict=True):
+            point.co = before * (1.3 if wide else 1.0)
+
+    def breathe(deeply: bool) -> None:
+        curve.keyframe_points[1].co.y = 2.0 if deeply else 1.0
+        mesh.shape_keys.animation_data.action.update_tag()
+
+    changes = {
+        "Loop": [lambda on: setattr(own, "loop", on)],
+        "Head Bone": [lambda on: setattr(own, "head_bone", "neck" if on else "")],
+        "Unit Scale": [lambda on: setattr(scene.unit_settings, "scale_length", 0.5 if on else 1.0)],
+        "body": [
+            lambda on: setattr(body, "hide_render", on),
+            lambda on: setattr(fat, "value", float(on)),
+            widen,
+            breathe,
+        ],
+    }
+    for what, edits in changes.items():
+        for edit in edits:
+            for on in (True, False):
+                edit(on)
+                assert _told() == ([what] if on else []), (what, edits.index(edit), on, _told())
+    if bpy.app.version >= (4, 0):  # without a window, older ones keep no undo steps
+        assert bpy.ops.ed.undo_push(message="before") == {"FINISHED"}
+        own.loop, fat.value = True, 1.0
+        assert bpy.ops.ed.undo_push(message="after") == {"FINISHED"} and _told() == ["Loop", "body"]
+        assert bpy.ops.ed.undo() == {"FINISHED"} and not _told()
+        strands, body, scene = (*map(bpy.data.objects.get, ("Hair", "Body")), bpy.context.scene)
+        own, mesh = strands.neuralocks_hair.armature.neuralocks_character, body.data
+        fat = mesh.shape_keys.key_blocks["Fat"]
+    own.head_bone, own.body = "head", body
+    body.name, fat.name, mesh.name = "Skin", "Thick", "Skin"
+    assert not _told(), "chosen is what was found, and a name is no shape"
+    for frame in (3, 9):
+        scene.frame_set(frame)
+        assert not _told(), "the cache shows what is keyed"
+    body.vertex_groups[0].add(range(len(mesh.vertices)), 0.5, "REPLACE")
+    assert _told() == ["body"]
+    strands["neuralocks_groomed"] = " ".join(strands["neuralocks_groomed"].split(" ")[:4])
+    own.loop = True
+    assert not _told()
+    strands.location.x += 0.1
+    assert _told() == ["place"]
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+    own.loop = False
+    assert _told() == ["Loop"]
+
+
+def keys_set_since(folder: Path) -> None:
+    """If hair bones that have baked keys are set to another motion, or stand in another wind, a note says so until that is as before, the
+    bones are live, or the keys are off or made anew. Keys that an older add-on made tell of nothing.
+    """
+    rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
+    scenes.dance(rig)
+    give_bone_model(rig, folder)
+    operators, own, scene = bpy.ops.neuralocks, rig.neuralocks_character, bpy.context.scene
+    assert operators.bake_keys() == {"FINISHED"} and not _told("Bake to Keyframes")
+    (folder / "later").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    own.rig_model = "//rig.neuralocks"
+    assert not _told("Bake to Keyframes")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "later" / "shot.blend"))
+    assert not _told("Bake to Keyframes") and own.rig_model == "//../rig.neuralocks", "the same model"
+    keyed, model = bones_at(rig, 9), own.rig_model
+    settings = {
+        "Motion": (own, "rig_motion", 0.5, 1.0),
+        "Model": (own, "rig_model", "", model),
+        "Chains": (own, "chains", "hair.01", ""),
+        "wind": (own, "wind", 6.0, 0.0),
+        "Loop": (own, "loop", True, False),
+        "Head Bone": (own, "head_bone", "neck", ""),
+        "Unit Scale": (scene.unit_settings, "scale_length", 0.5, 1.0),
+    }
+    for what, (owner, name, other, before) in settings.items():
+        for value in (other, before):
+            setattr(owner, name, value)
+            assert _told("Bake to Keyframes") == ([what] if value == other else [])
+    own.rig_motion, own.wind, own.loop = 0.5, 6.0, True
+    assert _told("Bake to Keyframes") == ["Motion", "wind", "Loop"] and apart(bones_at(rig, 9), keyed) == 0.0
+    assert operators.sample_motion() == {"FINISHED"}
+    own.rig_live = True
+    assert not _told("Bake to Keyframes")
+    live = bones_at(rig, 9)
+    own.rig_live = False
+    track = rig.animation_data.nla_tracks["Neuralocks Hair"]
+    for mute in (True, False):
+        track.mute = mute
+        assert bool(_told("Bake to Keyframes")) != mute
+    assert operators.bake_keys() == {"FINISHED"} and not _told("Bake to Keyframes")
+    assert apart(bones_at(rig, 9), live) < SAME < apart(live, keyed)
+    own.wind = 0.0
+    assert _told("Bake to Keyframes") == ["wind"]
+    del rig.animation_data.nla_tracks["Neuralocks Hair"].strips[0].action["neuralocks_keyed"]
+    assert not _told("Bake to Keyframes")
+    assert operators.remove_keys() == {"FINISHED"} and not _told("Bake to Keyframes")
+
+
+def _told(remedy: str = "Bake and Attach") -> list[str]:
+    """What the panel says was changed since a bake, and can be renewed so."""
+    bpy.context.view_layer.update()
+    notes = [line.split("shows it as it was: ")[1] for line in _lines() if "shows it as it was: " in line]
+    found = [note.split("; ") for note in notes]
+    assert all(ending == f"press {remedy} again" for _, ending in found), notes
+    return [part for parts, _ in found for part in parts.split(", ")]
+
+
+def _lines() -> list[str]:
+    """The notes, which the panel breaks into lines."""
+    return " ".join(drawn()).replace("Changed since", "\nChanged since").replace(" again", " again\n").splitlines()
+
+
+def _fatten(body, name: str = "Fat"):
+    """A shape key that makes the head wide."""
+    if body.data.shape_keys is None:
+        body.shape_key_add(name="Basis")
+    key = body.shape_key_add(name=name)
+    for point in key.data:
+        if point.co.z > 1.5:
+            point.co.x *= 1.4
+    key.value = 0.0
+    return key
+
+
+def body_edited_since(folder: Path) -> None:
+    """While a body is edited, the panel says what it said before; then, that it is another."""
+    needs_usd()
+    for keyed in (False, True):
+        scenes.empty()
+        rig, strands = scenes.dancer(20, skinned=True)
+        make_live(rig, strands)
+        body = bpy.data.objects["Body"]
+        if keyed:
+            _fatten(body).value = 1.0
+        choose(body)
+        bpy.context.scene.neuralocks.output = str(folder / "hair.usdc")
+        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+        for wide in (False, True):
+            bpy.ops.object.mode_set(mode="EDIT")
+            assert not _told()
+            bpy.ops.mesh.select_all(action="SELECT")
+            if wide:
+                bpy.ops.transform.resize(value=(1.3, 1.0, 1.0))
+            assert not _told()
+            bpy.ops.object.mode_set(mode="OBJECT")
+            assert _told() == (["body"] if wide else [])
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert _told() == ["body"]
+        bpy.ops.object.mode_set(mode="OBJECT")
