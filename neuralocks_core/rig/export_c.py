@@ -19,7 +19,7 @@ _AT_ONCE = 4
 """Rows of a layer that are summed at a time."""
 _WIDTH = 8
 """Columns of a layer are a multiple of this, the width of vector units."""
-HISTORY_BYTES = 10_816
+HISTORY_BYTES = 11_328
 """Size of the struct of history.h.in; a dynamic model needs one per character."""
 MADE = "Made by `neuralocks rig export-c`"
 """Text in the first lines of both files."""
@@ -109,6 +109,7 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "STEPS": spec.steps,
         "BINSTEPS": ", ".join(str(b) for b in spec.bins),
         "TAPER": ", ".join(_float(v) for v in spec.bin_weights),
+        "RATES": ", ".join(_float(1 / (spec.dt * b)) for b in spec.bins),
         "DT": repr(float(spec.dt)),
         **_network(layers),
     }
