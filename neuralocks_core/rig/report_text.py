@@ -46,6 +46,18 @@ def report_lines(report: dict) -> list[str]:
             rates = ", ".join(f"{gap} mm off at {rate}" for rate, gap in report["rates"][name].items())
             jump, cost = report["teleport"][name], report["cost"][name]
             line += f"; {rates} from 60 fps; a teleport flings it {jump['flung_mm']} mm for {jump['seconds']} s"
-            line += f"; {cost['multiply_adds']} multiply-adds and {cost['bytes_carried_on']} bytes an avatar"
+            line += f"; {_work(cost)} and {cost['bytes_carried_on']} bytes an avatar"
         lines.append(line)
     return lines
+
+
+def _work(cost: dict) -> str:
+    history = cost.get("history_multiply_adds")  # cards of older models count the network alone
+    of = (
+        ""
+        if history == 0
+        else " without a history"
+        if history is None
+        else f" of the network and {history} of the history"
+    )
+    return f"{cost['multiply_adds']} multiply-adds{of}"

@@ -26,6 +26,8 @@ from neuralocks_core.wind import Wind
 
 RATE = 30.0
 """Samples of the simulations [Hz]."""
+HISTORY, BIN = 200, 30
+"""Multiply-adds of the header's history: of a push with what a read does once, and of a read for each end of a bin."""
 SPRINGS, DEFAULTS = "spring bones, best of 12 settings", "spring bones, VRM's defaults"
 
 
@@ -169,10 +171,16 @@ def _teleports(rig, models, fit) -> dict:
 
 
 def _network_cost(model: RigModel) -> dict:
-    """Cost of one avatar and frame; `benchmarks/rig_speed.py` prints times."""
+    """Cost of one avatar and frame; `benchmarks/rig_speed.py` prints times. `multiply_adds` are the network's,
+    `history_multiply_adds` about those of the header's push and read, without the search for the ends of bins.
+    """
     work = sum(weight.size for weight, _ in model.layers) + 10 * len(model.chains)
-    history = HISTORY_BYTES if model.dynamic else 0
-    return {"multiply_adds": int(work), "square_roots": 2 * len(model.chains), "bytes_carried_on": history}
+    return {
+        "multiply_adds": int(work),
+        "history_multiply_adds": HISTORY + BIN * (len(model.spec.bins) + 1) if model.dynamic else 0,
+        "square_roots": 2 * len(model.chains) + 6 * model.dynamic,
+        "bytes_carried_on": HISTORY_BYTES if model.dynamic else 0,
+    }
 
 
 def _spring_cost(rig) -> dict:
@@ -180,7 +188,12 @@ def _spring_cost(rig) -> dict:
     quaternions; two tails are carried from frame to frame.
     """
     joints = len(rig.chains)
-    return {"multiply_adds": 110 * joints, "square_roots": 3 * joints, "bytes_carried_on": 24 * joints}
+    return {
+        "multiply_adds": 110 * joints,
+        "history_multiply_adds": 0,
+        "square_roots": 3 * joints,
+        "bytes_carried_on": 24 * joints,
+    }
 
 
 def _spring_points(rig, clip: Clip, step: float, fit) -> np.ndarray:

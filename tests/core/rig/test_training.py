@@ -249,6 +249,7 @@ def test_a_teleport_and_other_frame_rates():
     assert report["teleport"][SPRINGS]["flung_mm"] > 20 and report["teleport"][SPRINGS]["seconds"] > 0.1
     assert report["rates"]["network"]["24 fps"] < 0.5 < report["rates"][SPRINGS]["24 fps"]
     assert report["cost"]["network"]["bytes_carried_on"] == 0
+    assert report["cost"]["network"]["history_multiply_adds"] == 0
     assert set(report["motion_error"]) > {"network", SPRINGS}
 
 
