@@ -83,6 +83,7 @@ def look() -> float | None:
         session.sampling = None
         for shown in drawing(scene):
             refresh(shown)
+        session.wanting = False  # the next look finds what else is out of date, without a start of its own
     redraw()
     return 0.01
 

@@ -34,9 +34,11 @@ def before_frame(*_):
 @persistent
 def on_frame(scene, graph=None):
     """A new frame is evaluated, in the viewport or for a render."""
+    if session.paused:
+        return
     graph = graph or bpy.context.evaluated_depsgraph_get()
     # What other handlers have posed since is evaluated first. Not for a render: its engine would not learn what has changed.
-    if others_called() and graph.mode == "VIEWPORT" and not session.paused and live.carriers(scene):
+    if others_called() and graph.mode == "VIEWPORT" and live.carriers(scene):
         _unseen(graph.update)
     live.update(scene, graph, moved=True)
     _catch_up()

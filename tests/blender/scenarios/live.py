@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, make_live, messages, points_at
+from tests.blender.checks import MODEL, SAME, apart, make_live, messages, points_at
 from tests.blender.panel import drawn
 
 
@@ -179,6 +179,63 @@ def two_characters(_folder: Path) -> None:
     points_at(one, 13)
     assert "Two" in messages() and "armature" in messages()["Two"]
     assert apart(np.array([p.position for p in two.data.points]), groomed) == 0.0
+
+
+@patch("dcc_addon.background.SLICE", 0.0)
+def sampled_in_turn(folder: Path) -> None:
+    """When a file with two live characters is opened, each is sampled once, in turn; also if the first one cannot be."""
+    from dcc_addon import background
+    from dcc_addon.session import session
+
+    file = str(folder / "two.blend")
+    for hinder in (None, _headless, _hidden, _excluded):
+        scenes.empty()
+        for name in ("Anna", "Ben"):
+            rig = scenes.armature(name)
+            scenes.dance(rig)
+            strands = scenes.hair(rig, 10, name=f"Hair of {name}")
+            strands.neuralocks_hair.model, strands.neuralocks_hair.live = MODEL, True
+        if hinder:
+            hinder(bpy.data.objects["Anna"])
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new("Beside", None))
+        bpy.ops.wm.save_as_mainfile(filepath=file)
+        bpy.ops.wm.open_mainfile(filepath=file)
+        with patch.object(background, "in_slices", wraps=background.in_slices) as begun:
+            for _ in range(100):
+                if background.look() is None:
+                    break
+                if session.sampling:  # something else is edited meanwhile
+                    bpy.data.objects["Beside"].location.x += 1
+                    bpy.context.view_layer.update()
+        assert [call.args[1].name for call in begun.call_args_list] == ["Anna", "Ben"], (hinder, begun.call_args_list)
+        assert sorted(session.rigs) == (["Ben"] if hinder else ["Anna", "Ben"]) and session.sampling is None, hinder
+        assert set(messages()) == ({"Anna", "Hair of Anna"} if hinder else set()), messages()
+        ben = bpy.data.objects["Hair of Ben"]
+        with patch.object(background, "request") as again:
+            assert apart(points_at(ben, 9), points_at(ben, 14)) > 1e-3, hinder
+            session.rigs["Ben"].stale = session.wanting = True
+            background.look()
+        assert not again.called, "neither what has failed, nor a frame that is shown to be sampled, begins a sampling"
+
+
+def _headless(rig) -> None:
+    for bone in rig.data.bones:
+        bone.name = f"bone {len(bone.name)}"
+
+
+def _hidden(rig) -> None:
+    for strands in rig.children:
+        strands.parent = None
+    rig.hide_viewport = True
+
+
+def _excluded(rig) -> None:
+    scene, own = bpy.context.scene, bpy.data.collections.new("Own")
+    scene.collection.children.link(own)
+    for thing in (rig, *rig.children):
+        own.objects.link(thing)
+        scene.collection.objects.unlink(thing)
+    bpy.context.view_layer.layer_collection.children["Own"].exclude = True
 
 
 def deformer_added(_folder: Path) -> None:
