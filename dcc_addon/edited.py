@@ -36,6 +36,12 @@ def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None
     session.written[hair.name_full] = Written(of, kept, places, tuple(hair.modifiers.keys()), rest, spare)
 
 
+def forget(hair) -> None:
+    """The points were put back: what was written to this hair no longer counts, nor to another object with the same curves."""
+    data, own = identity(hair.data), hair.name_full
+    session.written = {name: each for name, each in session.written.items() if name != own and each.of[1] != data}
+
+
 def intact(hair) -> bool:
     """Whether the hair has the curves that were written to last, with the same number of points. If so, each point has a rest
     shape; points joined since then may have none.

@@ -280,7 +280,7 @@ def _restore(hair) -> None:
     """Restore the rest shape of an object's curves, also that of hair joined to them."""
     joined.settle(hair)
     curves.restore_rest(hair.data)
-    session.written.pop(hair.name_full, None)
+    edited.forget(hair)
 
 
 def _give_up(hair, message: str) -> None:

@@ -8,10 +8,11 @@ from unittest import SkipTest
 import bpy
 import numpy as np
 
+from dcc_addon.scene import curves
 from dcc_addon.scene.nodes import geometry_nodes
 from neuralocks_core.model import shipped
 from tests.blender import scenes
-from tests.blender.checks import MODEL, apart, baked_points, choose, make_live, messages, points_at
+from tests.blender.checks import MODEL, SAME, apart, baked_points, choose, make_live, messages, points_at
 
 
 def other_strands(folder: Path) -> None:
@@ -19,7 +20,6 @@ def other_strands(folder: Path) -> None:
     back; live resumes when an editing mode is left.
     """
     from dcc_addon.operators.bake import bake_steps
-    from dcc_addon.scene import curves
 
     rig = scenes.armature()
     scenes.dance(rig)
@@ -91,6 +91,28 @@ def separated(_folder: Path) -> None:
     bpy.context.view_layer.update()
     points_at(strands, 5)
     assert any("several objects share these curves" in text for text in messages().values()), messages()
+
+
+def linked_data(_folder: Path) -> None:
+    """Two live hairs are given the same curves, of either: both are told so and stay live, and move once they have their own."""
+    for given in (0, 1):
+        scenes.empty()
+        rig = scenes.armature()
+        scenes.dance(rig)
+        hairs = [scenes.hair(rig, 20), scenes.hair(rig, 20, length=0.4, name="Wig")]
+        for strands in hairs:
+            make_live(rig, strands)
+        rest, shown = curves.points(hairs[given].data), points_at(hairs[given], 9)
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.context.view_layer.objects.active = hairs[given]
+        bpy.ops.object.make_links_data(type="OBDATA")
+        bpy.context.view_layer.update()
+        assert hairs[0].data == hairs[1].data and all(strands.neuralocks_hair.live for strands in hairs), messages()
+        for name in ("Hair", "Wig"):
+            assert "several objects share these curves" in messages()[name], messages()
+        assert np.array_equal(curves.shown(hairs[0].data), rest)
+        bpy.ops.object.make_single_user(object=True, obdata=True)
+        assert all(apart(points_at(strands, 9), shown) < SAME for strands in hairs) and not messages(), messages()
 
 
 def replaced_model(folder: Path) -> None:
