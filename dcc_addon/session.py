@@ -7,7 +7,7 @@ Blender objects are looked up by name each time: a pointer kept over an undo or 
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -187,10 +187,10 @@ class Session:
         self.chains.pop(name, None)
         self.messages.pop(name, None)
 
-    def forget_motion(self, name: str) -> None:
-        """Drop an armature's sampled motion, and the hair that it carries."""
+    def forget_motion(self, name: str, staying: Set[str] = frozenset()) -> None:
+        """Drop an armature's sampled motion, and the hair that it carries except for that of the names `staying`."""
         sampled = self.rigs.pop(name, None)
-        for hair in sampled.motion.places if sampled is not None else ():
+        for hair in sampled.motion.places.keys() - staying if sampled is not None else ():
             self.stop_preparing(hair)
             self.hairs.pop(hair, None)
         self.failed.discard(name)
@@ -199,12 +199,14 @@ class Session:
         self.messages.pop(name, None)
 
     def renew_motion(self, name: str, sampled: SampledRig, reader) -> None:
-        """Store an armature's sampled motion; hair prepared for the same character stays, and is checked before use."""
+        """Store an armature's sampled motion; hair prepared for the same character stays if the motion has it, and is checked before
+        use.
+        """
         before = self.rigs.get(name)
-        if before is not None and before.character is sampled.character:
-            self.doubtful.update(before.motion.places)
-            del self.rigs[name]
-        self.forget_motion(name)
+        same = before is not None and before.character is sampled.character
+        staying = sampled.motion.places.keys() if same else frozenset()
+        self.forget_motion(name, staying)
+        self.doubtful.update(staying)
         self.rigs[name], self.readers[name] = sampled, reader
 
     def clear(self) -> None:

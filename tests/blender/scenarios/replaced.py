@@ -3,6 +3,7 @@
 
 from pathlib import Path
 from unittest import SkipTest
+from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -84,6 +85,31 @@ def exchanged(_folder: Path) -> None:
     assert not messages(), messages()
     first.neuralocks_hair.live = second.neuralocks_hair.live = False
     assert np.array_equal(curves.shown(first.data), rest[1]) and np.array_equal(curves.shown(second.data), rest[0])
+
+
+def renamed_back(_folder: Path) -> None:
+    """Live hair keeps moving at every new name, also at one that it had before, and already while it is sampled anew."""
+    from dcc_addon import background
+
+    rig, strands = scenes.dancer(20)
+    make_live(rig, strands)
+    shown = {frame: points_at(strands, frame) for frame in (14, 9)}
+    for name in ("Wig", "Hair", "Wig"):
+        strands.name = name
+        with patch.object(background, "request") as asked:
+            bpy.context.view_layer.update()
+        assert asked.called, f"nobody has noticed the name {name}"
+        while background.look() is not None:
+            pass
+        for frame in shown:
+            assert apart(points_at(strands, frame), shown[frame]) < SAME and not messages(), (name, messages())
+    for name in ("Hair", "Wig"):
+        strands.name = name
+        bpy.context.view_layer.update()
+    assert strands.neuralocks_hair.live
+    while background.look() is not None:
+        pass
+    assert apart(scenes.points(strands), shown[9]) < SAME and not messages(), messages()
 
 
 def converted(_folder: Path) -> None:
