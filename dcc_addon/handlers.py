@@ -99,6 +99,7 @@ def on_undo(scene, *_):
     """Undo may have brought back another pose, groom or choice."""
     session.doubt()
     live.forget_gone()
+    live.forget_ended()
     background.request()  # a half-done sampling refers to a scene that no longer exists
     live.refresh(scene)
     show_rest_left(bpy.data.objects)  # hair as it was before the update that followed a join

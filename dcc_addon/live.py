@@ -110,6 +110,15 @@ def forget_gone() -> None:
             del told[name]
 
 
+def forget_ended() -> None:
+    """Drop messages about what an undo has made no longer live. Without an undo they stay: they may say why Live went off by itself."""
+    own = lively(bpy.data.objects)
+    named = (*own.hairs, *own.armatures, *(hair.neuralocks_hair.armature for hair in own.hairs))
+    live = {thing.name_full for thing in named if thing is not None}
+    for name in session.messages.keys() - live:
+        del session.messages[name]
+
+
 def bereft(scene) -> bool:
     """Whether hair of the scene is still shown as an armature moved it that has been deleted."""
     if not session.written:

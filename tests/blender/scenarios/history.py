@@ -67,6 +67,24 @@ def undo(folder: Path) -> None:
     assert not messages(), messages()
 
 
+def live_undone(_folder: Path) -> None:
+    """What kept hair from being live is no longer told once Live is undone; redone, it is told again."""
+    if bpy.app.version < (4, 0):
+        raise SkipTest("without a window, older ones keep no undo steps")
+    rig, strands = scenes.dancer(20)
+    bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    strands.neuralocks_hair.model = "/nowhere/model.neuralocks"
+    bpy.ops.ed.undo_push(message="chosen")
+    strands.neuralocks_hair.live = True
+    bpy.ops.ed.undo_push(message="live")
+    assert "no such model file" in messages()["Hair"]
+    for step, told in ((bpy.ops.ed.undo, set()), (bpy.ops.ed.redo, {"Hair"})):
+        step()
+        bpy.context.view_layer.update()
+        assert set(messages()) == told, (step, messages())
+
+
 def applied_and_undone(_folder: Path) -> None:
     """What is applied to the points of live hair is applied to its rest shape at once, because Live may be switched off next; and
     again if an undo goes back to the state before the add-on did that.
