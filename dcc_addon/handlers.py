@@ -98,6 +98,7 @@ def on_load(*_):
 def on_undo(scene, *_):
     """Undo may have brought back another pose, groom or choice."""
     session.doubt()
+    named_from.remember(bpy.data.objects, SETTING.values())
     live.forget_gone()
     live.forget_ended()
     background.request()  # a half-done sampling refers to a scene that no longer exists

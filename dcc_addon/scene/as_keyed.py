@@ -37,15 +37,18 @@ def _numbers(armature, scene) -> dict[str, int]:
     own = armature.neuralocks_character
     return {
         "Motion": recorded.number_of(round(own.rig_motion, 6)),
-        "Model": recorded.number_of(_model(armature)),
+        "Model": _model(armature),
         "Chains": recorded.number_of(own.chains),
         "wind": as_carried.wind(armature),
         **as_carried.others(armature, scene),
     }
 
 
-def _model(armature) -> list:
-    """Which model is named, told by what is in its file: a save in another folder names it otherwise."""
+def _model(armature) -> int | None:
+    """A number of the model that is named, told by what is in its file: a save in another folder names it otherwise. None if that
+    cannot be read here.
+    """
     setting = "neuralocks_character.rig_model"
     path = armature.path_resolve(setting).strip()
-    return [bool(path), as_baked.print_of(full(path, library_of(armature, setting)))]
+    held = as_baked.print_of(full(path, library_of(armature, setting)))
+    return None if path and not held else recorded.number_of([bool(path), held])

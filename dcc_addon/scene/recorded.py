@@ -11,19 +11,24 @@ def number_of(found) -> int:
     return zlib.crc32(repr(found).encode())
 
 
-def as_text(numbers: dict[str, int]) -> str:
-    """What is stored: the numbers in their order. Parts that are added go last, so that older records can be read."""
-    return " ".join(f"{number:08x}" for number in numbers.values())
+def as_text(numbers: dict[str, int | None]) -> str:
+    """What is stored: the numbers in their order, a dash for what is unknown. Parts that are added go last, so that older records can
+    be read.
+    """
+    return " ".join("-" if number is None else f"{number:08x}" for number in numbers.values())
 
 
-def changed(told, now: dict[str, int], fewest: int) -> list[str]:
+def changed(told, now: dict[str, int | None], fewest: int) -> list[str]:
     """Which parts have other numbers `now` than in `told`, which may lack the last ones; none if it has not even the `fewest`, and so
-    is something else.
+    is something else. What is unknown counts as the same.
     """
     then = str(told).split(" ")
     if not fewest <= len(then) <= len(now):
         return []
-    return [part for part, old, number in zip(now, then, now.values(), strict=False) if old != f"{number:08x}"]
+    known = [
+        (part, old, number) for part, old, number in zip(now, then, now.values()) if "-" != old and number is not None
+    ]
+    return [part for part, old, number in known if old != f"{number:08x}"]
 
 
 def note(parts: list[str], remedy: str) -> str:

@@ -110,7 +110,10 @@ def own_names(names: Sequence[str], head: int | None) -> list[str]:
         meant = first in _SIDES or first in _TRUNK
         if not rest or meant or not _is_of_rig(first, [own[j] for j in beside], own[head]):
             return own
-        own = [_without_first(name) if _own_words(name)[:1] == [first] else name for name in own]
+        shorter = [_without_first(name) if _own_words(name)[:1] == [first] else name for name in own]
+        if shorter[head] == own[head]:  # letters stand before the word that are in none
+            return own
+        own = shorter
 
 
 def _is_of_rig(first: str, beside: list[str], head: str) -> bool:

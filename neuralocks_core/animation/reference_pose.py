@@ -40,7 +40,7 @@ def reference_end(clip: Clip, character: Character, poses: list[np.ndarray]) -> 
         wanted = _turns(character, body, pose)
         if not len(body) or _farthest(_turns(character, body, near[0]), wanted) > SAME:
             continue
-        body = _readable_body(character, near)
+        body = _readable_body(character, np.concatenate([pose[None], near]))
         wanted = _turns(character, body, pose)
         shown = [_farthest(_turns(character, body, each), wanted) <= SAME for each in near]
         count = shown.index(False) if False in shown else len(near)

@@ -171,7 +171,8 @@ def described(file: model_file.ModelFile) -> dict:
             del how["history"], how["clip"]
         if spec.feels_wind:
             how["wind"] = _WIND
-    meta = {name: value for name, value in file.meta.items() if name != "layers"}  # the weights, which rig.onnx has
+    # Layers are the weights, which rig.onnx has; what was measured is for people, and `inspect` tells it.
+    meta = {name: value for name, value in file.meta.items() if name not in ("layers", "report")}
     return result | {"model": meta | {"training": training}}
 
 

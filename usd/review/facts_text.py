@@ -20,6 +20,11 @@ def as_text(facts: dict, indent: int = 0) -> str:
             lines.append(f"{pad}{name}: {len(value)} {LONG[name]}, in --json")
         elif name == "began with":  # each training records the one that it started from
             lines.append(f"{pad}trainings before this one: {_trainings(value)}, in --json")
+        elif _is_table(value):
+            lines.append(f"{pad}{name}:")
+            lines += (
+                f"{pad}  {row}: {'; '.join(f'{k} {v:g}' for k, v in each.items())}" for row, each in value.items()
+            )
         elif isinstance(value, dict) and value:
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
         elif isinstance(value, list) and value and isinstance(value[0], dict):
@@ -48,6 +53,15 @@ def _each(name: str, entries: list[dict], indent: int) -> list[str]:
         if same:
             lines.append(f"{pad}  likewise: {', '.join(str(next(iter(each.values()))) for each in same)}")
     return lines
+
+
+def _is_table(value) -> bool:
+    """Whether it has rows of several numbers, of which each is a line."""
+    rows = list(value.values()) if isinstance(value, dict) else []
+    numbers = (
+        isinstance(row, dict) and len(row) > 1 and all(isinstance(v, int | float) for v in row.values()) for row in rows
+    )
+    return bool(rows) and all(numbers)
 
 
 def _short(value) -> str:

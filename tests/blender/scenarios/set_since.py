@@ -172,6 +172,11 @@ def body_edited_since(folder: Path) -> None:
         choose(body)
         bpy.context.scene.neuralocks.output = str(folder / "hair.usdc")
         assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+        body.vertex_groups.new(name="pin").add([0, 1], 1.0, "REPLACE")  # of cloth, say: it moves nothing
+        rig.data.bones["head"].name = "Skull"
+        bpy.context.view_layer.update()
+        assert not _told()
+        rig.data.bones["Skull"].name = "head"
         for wide in (False, True):
             bpy.ops.object.mode_set(mode="EDIT")
             assert not _told()

@@ -58,3 +58,9 @@ def test_without_a_head_only_a_colon_tells():
 
 def test_a_rig_called_hair_has_the_joints_of_any():
     assert find_humanoid(_paths("Hair_"), OVER).joints == find_humanoid(_paths(""), OVER).joints
+
+
+@pytest.mark.parametrize("rig", ["Élise_", "初音Rig_", "Русалка Rig ", "µ_Rig_"])
+def test_a_name_that_begins_with_letters_of_no_word_is_left(rig):
+    """Nothing can be taken off; it ends all the same."""
+    assert own_names(_paths(rig), 4) == [f"{rig}{name}" for name in BODY]

@@ -90,3 +90,9 @@ def test_hidden_joints_do_not_count():
     motion = clip(GOES_ON)
     motion.joints[:, NAMES.index("right_lower_arm"), :3, :3] = 0
     assert end(motion) == pytest.approx(1 / RATE)
+
+
+def test_a_pose_that_mirrors_a_joint_stops_nothing():
+    rest = clip(GOES_ON).joints[0].copy()
+    rest[NAMES.index("right_lower_arm"), :3, 0] *= -1
+    assert end(clip(GOES_ON), rest) == pytest.approx(1 / RATE)

@@ -145,7 +145,7 @@ def test_inspect_tells_of_a_model_what_a_person_reads(path, capsys):
     text = capsys.readouterr().out
     assert "inputs of the body" in text and text.count("\n") < 150  # the curve alone has 200 points
     assert "trainings before this one: " in text and "began with:" not in text
-    assert ("hair: " in text) == (path in model_file.specialists()) and max(map(len, text.splitlines())) < 1500
+    assert (" hair: " in text) == (path in model_file.specialists()) and max(map(len, text.splitlines())) < 1500
 
 
 def test_inspect_tells_of_a_model_that_moves_hair_worse_than_not_at_all(tmp_path, capsys):
