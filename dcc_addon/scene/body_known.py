@@ -49,11 +49,8 @@ def _surface(body) -> list:
     rigs = (each.object for each in body.modifiers if each.type == "ARMATURE")
     bones = {bone.name for rig in rigs if rig is not None for bone in rig.data.bones}
     # Groups of pins and masks move nothing, and their order says nothing.
-    found = [
-        count,
-        len(mesh.polygons),
-        sorted(weight for group, weight in weights if group < len(groups) and groups[group] in bones),
-    ]
+    weighed = sorted(weight for group, weight in weights if group < len(groups) and groups[group] in bones)
+    found = [count, len(mesh.polygons), weighed]
     if keys is None:
         return [*found, number_of(mesh)]
     played = [number_of_keys(curve) for curve in curves_of(keys.animation_data) if not is_muted(curve)]
@@ -65,7 +62,6 @@ def _held(keys) -> list:
     moving = animated(keys.animation_data)
     if not keys.use_relative:
         return [] if "eval_time" in moving else [keys.eval_time]
-    others = [block for block in keys.key_blocks if block != keys.reference_key and block.value]
+    others = [block for block in keys.key_blocks if block != keys.reference_key and block.value and not block.mute]
     held = [block for block in others if not moving & {block.path_from_id("value"), block.path_from_id("mute")}]
-    held = [block for block in held if not block.mute]
     return [(round(block.value, 6), number_of_shape(block)) for block in held]

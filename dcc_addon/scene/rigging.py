@@ -9,6 +9,7 @@ import zlib
 import bpy
 import numpy as np
 
+from . import recorded
 from .actions import HAIR, as_before
 from .animated import animated, curves_of, strips_of, written
 from .body import up_to_armature, weighed_so
@@ -31,7 +32,7 @@ def rigging(things) -> int:
     others = reached(things)[len(things) :]
     shaping = [_modifiers(thing, up_to_armature(thing)) for thing in things if thing.type == "MESH"]
     found = [*map(_object, things), *shaping, *([*_object(thing), *_modifiers(thing)] for thing in others)]
-    return zlib.crc32(repr(found).encode())
+    return recorded.number_of(found)
 
 
 def posture(things) -> int:
@@ -41,7 +42,7 @@ def posture(things) -> int:
     """
     others = reached(things)[len(things) :]
     found = [*map(_held, things), *([*_held(thing), *shape(thing)] for thing in others)]
-    return zlib.crc32(repr(found).encode())
+    return recorded.number_of(found)
 
 
 def unreported(body) -> int:
@@ -51,7 +52,7 @@ def unreported(body) -> int:
     keys = body.data.shape_keys
     curves = curves_of(keys.animation_data) if keys else ()
     found = [*shape(body), *((curve.data_path, number_of_keys(curve)) for curve in curves), weighed_so(body)]
-    return zlib.crc32(repr(found).encode())
+    return recorded.number_of(found)
 
 
 def reached(things) -> list:

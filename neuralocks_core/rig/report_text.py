@@ -53,11 +53,5 @@ def report_lines(report: dict) -> list[str]:
 
 def _work(cost: dict) -> str:
     history = cost.get("history_multiply_adds")  # cards of older models count the network alone
-    of = (
-        ""
-        if history == 0
-        else " without a history"
-        if history is None
-        else f" of the network and {history} of the history"
-    )
+    of = {0: "", None: " without a history"}.get(history, f" of the network and {history} of the history")
     return f"{cost['multiply_adds']} multiply-adds{of}"

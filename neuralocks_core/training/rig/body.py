@@ -8,6 +8,7 @@ import numpy as np
 from neuralocks_core.body.enclosed import proven_distances
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig.surface_samples import SurfaceSamples, nearest
 
 KEPT = 2000
@@ -30,18 +31,12 @@ class BodyPatch:
     @classmethod
     def of(cls, rig: HairRig, count: int) -> "BodyPatch | None":
         """None if there is no body, or hair reaches none of its faces."""
-        body = rig.character.body
-        return None if body is None or not len(rig.points) or not rig.in_reach(body).any() else cls(rig, count)
+        near = _in_reach(rig)
+        return None if near is None else cls(near, rig.character.head, count)
 
-    def __init__(self, rig: HairRig, count: int):
-        body, character = rig.character.body, rig.character
-        inside = rig.in_reach(body)
-        used = np.unique(body.triangles[inside])
-        place = np.zeros(len(body.points), int)
-        place[used] = np.arange(len(used))
-        near = body.part(used, place[body.triangles[inside]])
+    def __init__(self, near: Body, head: int, count: int):
         # The hair was fitted to its own head: other bodies vary below it.
-        on_head = np.sum(near.joint_weights * (near.joint_indices == character.head), axis=1)
+        on_head = np.sum(near.joint_weights * (near.joint_indices == head), axis=1)
         shapes = {}
         for name, offsets in near.shapes.items():
             mean = offsets[on_head > 0.9].mean(axis=0) if (on_head > 0.9).any() else 0.0
@@ -52,12 +47,18 @@ class BodyPatch:
 
 def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Signed distances (T, V) [m] of points (T, V, 3), canonical, to the body under world joint transforms (T, J, 4, 4)."""
-    patch = BodyPatch.of(rig, 1)
-    if patch is None:
+    body = _in_reach(rig)
+    if body is None:
         return np.full(points.shape[:2], np.inf)
-    body = patch.body
     skinning = rig.character.skinning(joints)
     return np.stack([proven_distances(body.posed(m), body.triangles, p) for m, p in zip(skinning, points)])
+
+
+def _in_reach(rig: HairRig) -> Body | None:
+    """The part of the body that hair can reach; None if there is no such part."""
+    body = rig.character.body
+    near = None if body is None or not len(rig.points) else body.only(body.triangles[rig.in_reach(body)])
+    return None if near is None or not len(near.triangles) else near
 
 
 def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:

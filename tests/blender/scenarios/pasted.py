@@ -19,10 +19,8 @@ def pasted(folder: Path) -> None:
         each.mkdir()
     model = Path(shutil.copy(MODEL, shots / "mine.neuralocks"))
     settings = bpy.context.preferences.filepaths
-    before, settings.temporary_directory = (
-        settings.temporary_directory,
-        str(folder),
-    )  # where Blender puts what is copied
+    before = settings.temporary_directory
+    settings.temporary_directory = str(folder)  # where Blender puts what is copied
     rig = scenes.armature()
     strands = scenes.hair(rig, 20)
     bpy.ops.wm.save_as_mainfile(filepath=str(shots / "shot.blend"))
@@ -31,6 +29,10 @@ def pasted(folder: Path) -> None:
         _copied(model)
         bpy.ops.wm.save_mainfile()
         _copied(model)
+        if bpy.app.version >= (4, 0):  # without a window, older ones keep no undo steps
+            assert bpy.ops.ed.undo_push(message="one") == bpy.ops.ed.undo_push(message="two") == {"FINISHED"}
+            assert bpy.ops.ed.undo() == {"FINISHED"}
+            _copied(model)
         bpy.ops.wm.open_mainfile(filepath=str(shots / "shot.blend"))
         _copied(model)
         bpy.ops.wm.save_as_mainfile(filepath=str(later / "shot.blend"))

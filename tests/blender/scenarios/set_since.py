@@ -72,6 +72,12 @@ def character_set_since(folder: Path) -> None:
     for frame in (3, 9):
         scene.frame_set(frame)
         assert not _told(), "the cache shows what is keyed"
+    others = [each for each in scene.collection.objects if each.type == "MESH"]
+    for each in others:
+        scene.collection.objects.unlink(each)
+    assert not _told(), "where hair was appended alone, nobody changed a body"
+    for each in others:
+        scene.collection.objects.link(each)
     body.vertex_groups[0].add(range(len(mesh.vertices)), 0.5, "REPLACE")
     assert _told() == ["body"]
     strands["neuralocks_groomed"] = " ".join(strands["neuralocks_groomed"].split(" ")[:4])
@@ -99,6 +105,9 @@ def keys_set_since(folder: Path) -> None:
     assert not _told("Bake to Keyframes")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "later" / "shot.blend"))
     assert not _told("Bake to Keyframes") and own.rig_model == "//../rig.neuralocks", "the same model"
+    (folder / "rig.neuralocks").rename(folder / "away.neuralocks")
+    assert not _told("Bake to Keyframes"), "a model that is missing here is no other one"
+    (folder / "away.neuralocks").rename(folder / "rig.neuralocks")
     keyed, model = bones_at(rig, 9), own.rig_model
     settings = {
         "Motion": (own, "rig_motion", 0.5, 1.0),

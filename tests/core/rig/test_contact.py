@@ -207,7 +207,7 @@ def test_other_bodies_vary_below_the_head():
     on_head = body.joint_indices[:, 0] == who.head
     offsets = np.where(on_head[:, None], [0.0, 0.01, 0.0], [0.0, 0.01, 0.05])
     rig = replace(rig, character=replace(who, body=replace(body, shapes={"wide": offsets})))
-    patch = BodyPatch(rig, 300)
+    patch = BodyPatch.of(rig, 300)
     still = np.tile(np.eye(4), (len(who.skeleton.names), 1, 1))
     moved = patch.body.posed(still, np.array([1.0])) - patch.body.points
     below = patch.body.joint_indices[:, 0] != who.head

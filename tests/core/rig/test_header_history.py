@@ -266,3 +266,13 @@ def test_gravity_may_point_anywhere(tmp_path):
     np.testing.assert_allclose(felt[1:], [felt[0]] * 2, atol=2e-3)
     rows[60, 8:] = np.nan  # one damaged frame is forgotten when the history has passed
     assert np.abs(run_c(program, rows, felt[0].shape[1]) - felt[2])[160:].max() < 1e-4
+
+
+def test_a_history_that_nobody_reset_keeps_no_engine_waiting(tmp_path):
+    """Whatever is in it then: an endless search would end this test by its time limit."""
+    export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
+    program = HISTORY_HARNESS.replace("nl_hair_history_reset(&history);", "history.count = 2; (void)row;").replace(
+        "nl_hair_history_push(&history, (double)row[0], row + 1, row + 4);", ""
+    )
+    count = 6 * len(rig_spec(True).bins)
+    assert run_c(compiled(tmp_path, program), np.zeros((1, 8), np.float32), count).shape == (1, count)

@@ -95,6 +95,16 @@ def test_chains_of_other_names_beside_those_found_are_told(edited, name, told):
     assert [note for note in inspect(shot)["spoils"] if " not moved; " in note] == expected
 
 
+def with_strands(shot):
+    """The stage of a shot, with a strand beside the mesh hair."""
+    stage = Usd.Stage.Open(str(shot))
+    curves = UsdGeom.BasisCurves.Define(stage, "/Who/Strands")
+    curves.CreatePointsAttr([(0, 1.6, 0), (0, 1.7, 0)])
+    curves.CreateCurveVertexCountsAttr([2])
+    stage.Save()
+    return stage
+
+
 @pytest.mark.parametrize(
     ("name", "drives", "told"),
     [
@@ -123,11 +133,7 @@ def test_chains_of_other_names_are_told_where_none_is_found(edited, name, drives
     (note,) = notes()
     assert note.startswith(f"/Who/Rig: '{name}_0' drives skin below the head, but no name says hair and {told}")
     assert len(read_rigged_hair(shot, chains=[note.rpartition("--chains ")[2]]).rig.chains) == 3
-    stage = Usd.Stage.Open(str(shot))
-    curves = UsdGeom.BasisCurves.Define(stage, "/Who/Strands")
-    curves.CreatePointsAttr([(0, 1.6, 0), (0, 1.7, 0)])
-    curves.CreateCurveVertexCountsAttr([2])
-    stage.Save()
+    stage = with_strands(shot)
     assert notes() == [note]
     UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set([0, 1, 2, 3, 2, 3, 0, 0, 0])
     stage.Save()
@@ -151,11 +157,7 @@ def test_a_beard_is_told_where_no_hair_is_found(edited):
     (note,) = notes()
     assert "'beard_0' drives" in note and "it is named like what a face has or wears; if it is hair" in note
     assert len(read_rigged_hair(shot, chains=[note.rpartition("--chains ")[2]]).rig.chains) == 3
-    stage = Usd.Stage.Open(str(shot))
-    curves = UsdGeom.BasisCurves.Define(stage, "/Who/Strands")
-    curves.CreatePointsAttr([(0, 1.6, 0), (0, 1.7, 0)])
-    curves.CreateCurveVertexCountsAttr([2])
-    stage.Save()
+    with_strands(shot)
     assert notes() == []
 
 
