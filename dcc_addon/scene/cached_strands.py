@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands that were edited after a cache was attached to them: Blender up to 4.2 crashes where a cache has others than the object, and
-later ones show those of the cache.
+later ones show those of the cache. If they have got one radius a strand, Blender since 5.0 crashes where the cache has widths.
 """
 
 import bpy
 
+from .curves import one_radius_a_strand
+
 KEY = "neuralocks_cached"
-"""The property of Curves that says how many strands and points their cache has."""
+"""The property of Curves that says how many strands and points their cache has, and, by a third number, that it has no widths."""
 OFF = "neuralocks_cache_off"
 """The property that says that their cache was switched off because they have others."""
 
@@ -26,7 +28,9 @@ def forget(data) -> None:
 
 
 def changed(data) -> bool:
-    """Whether strands were added or deleted since a cache was attached."""
+    """Whether strands were added or deleted since a cache was attached, or their radii became such, or no longer such, as it leaves as
+    they are.
+    """
     told = data.get(KEY)
     return told is not None and list(told) != _sizes(data)
 
@@ -49,4 +53,4 @@ def to_switch() -> list[tuple]:
 
 
 def _sizes(data) -> list[int]:
-    return [len(data.curves), len(data.points)]
+    return [len(data.curves), len(data.points), *([1] if one_radius_a_strand(data) else [])]

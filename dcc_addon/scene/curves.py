@@ -55,6 +55,14 @@ def radius(data) -> np.ndarray | None:
     return values
 
 
+def one_radius_a_strand(data) -> bool:
+    """Whether the attribute `radius` has a value for each strand, as scripts and geometry nodes can leave it since Blender 5.0. Blender
+    crashes, or writes beyond the values, where it reads widths of a cache into it.
+    """
+    attribute = data.attributes.get("radius")
+    return attribute is not None and attribute.domain == "CURVE"
+
+
 def kind(data) -> str:
     """The strands' type, one of TYPES; POLY if they have several types.
 

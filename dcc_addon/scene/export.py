@@ -57,7 +57,7 @@ def write_shot(path: Path, armature, sampled, hairs, undrawn=(), share: float = 
         skins=list(skins.values()),
         shape=motion.shape,
         hair=[
-            _hair(hair, label, sampled, hair.name_full not in undrawn)
+            _hair(hair, label, sampled, hair.name_full not in undrawn, played)
             for hair, label in zip(hairs, labels, strict=True)
         ],
         name=armature.name_full,
@@ -70,7 +70,7 @@ def write_shot(path: Path, armature, sampled, hairs, undrawn=(), share: float = 
     return prims
 
 
-def _hair(hair, label: str, sampled, visible: bool):
+def _hair(hair, label: str, sampled, visible: bool, played: bool):
     """A hair object at rest, as `HairArrays`."""
     from usd.assets.prims import Spline
     from usd.assets.scene_writer import HairArrays
@@ -89,6 +89,7 @@ def _hair(hair, label: str, sampled, visible: bool):
         joint=sampled.carrying(hair.name_full).carrying_joint,
         spline=Spline("cubic", basis, "pinned") if basis else Spline(),
         visible=visible,
+        keeps_widths=played and curves.one_radius_a_strand(data),
     )
 
 

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdSkel
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from ..border.arrays import floats, integers, row_matrices, row_matrix, vectors
 
@@ -22,7 +22,9 @@ POLYLINES = Spline()
 """Straight from vertex to vertex."""
 
 
-def author_curves(stage: Usd.Stage, path, points, counts, widths, spline: Spline) -> UsdGeom.BasisCurves:
+def author_curves(
+    stage: Usd.Stage, path, points, counts, widths, spline: Spline, as_primvar: bool = False
+) -> UsdGeom.BasisCurves:
     """Define a BasisCurves prim.
 
     Args:
@@ -32,6 +34,8 @@ def author_curves(stage: Usd.Stage, path, points, counts, widths, spline: Spline
         counts: (S,) vertices of each curve.
         widths: (P,), (S,), or (1,) for all.
         spline: how the vertices are interpolated.
+        as_primvar: write the widths as the primvar that renderers take before the curves' own. Blender does not, so hair that
+            plays the prim keeps its own.
     """
     curves = UsdGeom.BasisCurves.Define(stage, path)
     points, widths = np.asarray(points, np.float32), np.asarray(widths, np.float32)
@@ -41,9 +45,15 @@ def author_curves(stage: Usd.Stage, path, points, counts, widths, spline: Spline
     curves.CreateWrapAttr(spline.wrap)
     curves.CreatePointsAttr(vectors(points))
     curves.CreateCurveVertexCountsAttr(integers(counts))
-    curves.CreateWidthsAttr(floats(widths))
-    each = {1: UsdGeom.Tokens.constant, len(counts): UsdGeom.Tokens.uniform}
-    curves.SetWidthsInterpolation(each.get(len(widths), UsdGeom.Tokens.vertex))
+    if len(widths) == len(counts) > 1:
+        # Blender reads one width a vertex, beyond the end if there are fewer.
+        widths = np.repeat(widths, counts)
+    kind = UsdGeom.Tokens.constant if len(widths) == 1 else UsdGeom.Tokens.vertex
+    if as_primvar:
+        UsdGeom.PrimvarsAPI(curves).CreatePrimvar("widths", Sdf.ValueTypeNames.FloatArray, kind).Set(floats(widths))
+    else:
+        curves.CreateWidthsAttr(floats(widths))
+        curves.SetWidthsInterpolation(kind)
     reach = np.float32(widths.max() / 2)
     curves.CreateExtentAttr(vectors([points.min(axis=0) - reach, points.max(axis=0) + reach]))
     return curves

@@ -45,12 +45,13 @@ class HairArrays:
 
     Attributes:
         name: a valid identifier.
-        points: (P, 3) in the prim's own space; counts: (S,); widths: (P,), or (1,) for all.
+        points: (P, 3) in the prim's own space; counts: (S,); widths: (P,), (S,), or (1,) for all.
         bind_place: the prim's place in the bind pose, (4, 4).
         places: its place at every frame, (T, 4, 4).
         joint: index of the joint that carries it.
         spline: how its vertices are interpolated.
         visible: whether it is drawn.
+        keeps_widths: whether its application keeps its own widths when it plays the bake; see `author_curves`.
     """
 
     name: str
@@ -62,6 +63,7 @@ class HairArrays:
     joint: int
     spline: Spline = Spline()
     visible: bool = True
+    keeps_widths: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +177,9 @@ def _skin(stage: Usd.Stage, skin: SkinArrays, skeleton: UsdSkel.Skeleton) -> Non
 
 
 def _hair(stage: Usd.Stage, hair: HairArrays, frames: np.ndarray, skeleton: UsdSkel.Skeleton) -> None:
-    curves = author_curves(stage, prim_path(hair.name), hair.points, hair.counts, hair.widths, hair.spline)
+    curves = author_curves(
+        stage, prim_path(hair.name), hair.points, hair.counts, hair.widths, hair.spline, hair.keeps_widths
+    )
     op = curves.AddTransformOp(UsdGeom.XformOp.PrecisionDouble)
     op.Set(row_matrix(hair.places[0]))
     if (np.abs(hair.places - hair.places[0]) > 1e-9).any():
