@@ -1,6 +1,6 @@
 # make demo   see moving hair: installs the runtime without torch, bakes the shipped shot, makes a picture and a clip
 # make test   installs everything that the tests need, and runs the linter and all tests
-# make matrix runs the tests of the extension in every Blender that it supports; installs those that are Python modules
+# make matrix runs the tests of the extension and of bakes in every Blender that is supported; installs those that are Python modules
 # make addon  builds the Blender extension into dist/
 # make native compiles the C files again, for all platforms
 # make lowest runs the tests of what needs no torch with the oldest packages that pyproject.toml allows
@@ -84,7 +84,8 @@ PYTHON_3_13 = $(call find-python,3.13)
 blender: .venv-blender-4.2/installed .venv-blender-5.2/installed
 
 matrix: $(VENV)/installed-test blender .venv-blender-4.5/installed .venv-blender-5.0/installed
-	NEURALOCKS_BLENDERS=all $(TESTING) $(BIN)/python -m pytest -n 2 --dist loadfile -q tests/blender
+	NEURALOCKS_BLENDERS=all $(TESTING) $(BIN)/python -m pytest -n 2 --dist loadfile -q \
+	    tests/blender tests/usd/test_in_blender.py tests/usd/rig/test_in_blender.py
 
 .venv-blender-4.2/installed:
 	$(call blender-venv,$(PYTHON_3_11),4.2.23)

@@ -10,7 +10,7 @@ import pytest
 from neuralocks_core.rig import RigModel
 from usd.rig.bake import bake_rig
 
-from ...blenders import python_of
+from ...blenders import VERSIONS, python_of
 
 ROOT = Path(__file__).parents[3]
 SHOT = ROOT / "examples" / "mesh_hair" / "shot.usda"
@@ -35,7 +35,7 @@ os._exit(0)
 """
 
 
-@pytest.mark.parametrize("version", ["4.2", "5.2"])
+@pytest.mark.parametrize("version", VERSIONS)
 def test_only_hair_bones_move_otherwise(tmp_path, version):
     """Pose and rest matrices of every bone, before and after, at frames of each kind of motion in the shot."""
     python = python_of(version)
