@@ -21,8 +21,8 @@ PAUSE = 0.3
 """Time without a further edit before sampling begins [s]."""
 
 _work: list = []
-_wanted = {"at": 0.0, "closely": False}
-"""When to look, on the clock, and whether to look at how rigs are made up, too."""
+_wanted = {"at": 0.0, "closely": False, "edits": -1}
+"""When to look, on the clock, whether to look at how rigs are made up, too, and after how many edits of animation."""
 
 
 def request() -> None:
@@ -32,9 +32,17 @@ def request() -> None:
     _work.clear()
     if bpy.app.background:
         return
-    _wanted["at"] = time.perf_counter() + PAUSE
+    _wanted["at"], _wanted["edits"] = time.perf_counter() + PAUSE, session.edits
     if not bpy.app.timers.is_registered(look):
         bpy.app.timers.register(look, first_interval=PAUSE)
+
+
+def want() -> None:
+    """Sample what is out of date, because it is shown. Every frame shows it until it is sampled: what is at work, or about to begin,
+    goes on, or an artist who scrubs would wait for ever. It begins again if animation was edited since.
+    """
+    if _wanted["edits"] != session.edits or not bpy.app.timers.is_registered(look):
+        request()
 
 
 def doubt(closely: bool = True) -> None:
@@ -61,7 +69,7 @@ def look() -> float | None:
     if (wait := _wanted["at"] - time.perf_counter()) > 0:
         return wait
     scenes = scenes_shown()
-    if _work and _work[0][0] not in {scene.name_full for scene in scenes}:  # other scenes are shown now
+    if _work and not any(_concerns(scene) for scene in scenes):  # other scenes are shown now, or it is no longer live
         _work.clear()
     if not _work:
         if _wanted["closely"]:
@@ -97,6 +105,12 @@ def _todo(scenes: list) -> tuple | None:
                 return scene, armature
         seen |= set(carriers(scene))
     return None
+
+
+def _concerns(scene) -> bool:
+    """Whether this is the scene at work, and something on the armature at work is live in it."""
+    name, armature, _ = _work[0]
+    return scene.name_full == name and any(each.name_full == armature for each in carriers(scene))
 
 
 def _go_on() -> None:

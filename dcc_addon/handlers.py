@@ -183,7 +183,7 @@ def _catch_up() -> None:
     """Sample soon, if live hair found its motion missing or out of date."""
     if session.wanting:
         session.wanting = False
-        background.request()
+        background.want()
 
 
 HANDLERS = {

@@ -41,28 +41,32 @@ much as a block, and a block takes about a slice of work.
 
 def in_slices(context, armature, seconds: float = math.inf) -> Iterator[tuple[int, int]]:
     """Sample an armature's motion, `seconds` at a time, and put it into the session at the end; yields (done, total) between two
-    slices, when the scene is as it was before, and can be viewed and edited.
+    slices, when the scene is as it was before, and can be viewed and edited. If that changed what is sampled, such as the name of
+    its hair, it begins again.
 
     Raises:
         NeuralocksError: the armature cannot be sampled; says why in plain words.
     """
-    scene, frames = context.scene, _sample(context, armature)
+    scene, name = context.scene, armature.name_full
     while True:
-        end = time.perf_counter() + seconds
-        with stepping(scene):
-            reached = next((each for each in frames if time.perf_counter() > end), None)
-        if reached is None:
-            return
-        yield reached
+        key, frames = key_of(armature, scene), _sample(context, scene, armature)
+        while key == key_of(armature, scene):
+            end = time.perf_counter() + seconds
+            with stepping(scene):
+                reached = next((each for each in frames if time.perf_counter() > end), None)
+            if reached is None:
+                return
+            yield reached
+            armature = named(name)
 
 
-def _sample(context, armature) -> Iterator[tuple[int, int]]:
-    """Step through the frames; yields (done, total)."""
+def _sample(context, scene, armature) -> Iterator[tuple[int, int]]:
+    """Step through the frames of a scene; yields (done, total)."""
     found_anew()
-    recording = _Recording(context, armature)
+    recording = _Recording(context, scene, armature)
     total = len(recording.frames)
     yield 0, total
-    for body in bodies_of(armature, context.scene):
+    for body in bodies_of(armature, scene):
         for _ in body_reader.weighed(body):
             yield 0, total
     for row in range(total):
@@ -76,8 +80,8 @@ class _Recording:
     frames at a time: for hundreds of bones, all at once would block Blender for seconds.
     """
 
-    def __init__(self, context, armature):
-        self._context, self._scene, self.name = context, context.scene, armature.name_full
+    def __init__(self, context, scene, armature):
+        self._context, self._scene, self.name = context, scene, armature.name_full
         self._rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
         humanoid = self._rig.humanoid()
         self._head, self._needed = humanoid["head"], set(humanoid.values())
