@@ -10,7 +10,7 @@ from . import background, live, model_updates
 from .live_strands import live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
 from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
-from .scene import blur, named_from
+from .scene import as_groomed, blur, named_from
 from .scene.appended import remake
 from .scene.attach import switch_changed
 from .scene.last_called import go_last, others_called
@@ -59,7 +59,7 @@ def on_update(scene, graph):
     live.forget_gone()
     changed = [update.id for update in graph.updates]
     objects = {thing.name_full: thing.original for thing in changed if isinstance(thing, bpy.types.Object)}
-    forget_data(changed)
+    forget_data(graph)
     make_comparable(objects.values())  # a library may have been reloaded
     show_rest_left(objects.values())
     if live.bereft(scene):
@@ -114,6 +114,7 @@ def before_save(target=None, *_):
     blur.end()
     model_updates.remember()
     make_comparable(bpy.data.objects)
+    as_groomed.keep(bpy.data.objects)
     for scene in bpy.data.scenes:
         live.show_rest(scene)
     show_all_rest()

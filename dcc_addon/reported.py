@@ -15,23 +15,14 @@ from .scene.shapes import follows
 from .session import session
 
 
-def forget_data(changed) -> None:
+def forget_data(graph) -> None:
     """Weights and shapes of meshes, and points of grooms, that were edited are read again."""
-    meshes = [thing.name_full for thing in changed if isinstance(thing, bpy.types.Mesh)]
-    body_known.edited(
-        meshes, keys=any(isinstance(thing, bpy.types.Action) and _moves_shapes(thing) for thing in changed)
-    )
-    for thing in changed:
+    body_known.updated(graph.updates)
+    for thing in (update.id for update in graph.updates):
         if isinstance(thing, bpy.types.Mesh):
             session.weights.pop(thing.name_full, None)
         elif isinstance(thing, bpy.types.Curves):
             session.grooms.pop(thing.name_full, None)
-
-
-def _moves_shapes(action) -> bool:
-    """Whether any shape key plays an action, by itself or in a strip."""
-    played = (keys.animation_data for keys in bpy.data.shape_keys)
-    return any(data is not None and (data.action == action or data.nla_tracks) for data in played)
 
 
 def mark_stale(graph, changed, carriers, switched: set[str]) -> None:

@@ -124,10 +124,11 @@ class Session:
     """A number of the rest points of each groom that plays a cache, by the name of its Curves; dropped when these are edited."""
     heads: dict[str, tuple[tuple, str]] = field(default_factory=dict)
     """The head bone of armatures, by name, and what it was found by; see `scene.as_carried`."""
-    bodies: dict[tuple, int] = field(default_factory=dict)
-    """A number of the bodies of an armature in a scene; dropped when anything is edited. See `scene.body_known`."""
-    surfaces: dict[str, int] = field(default_factory=dict)
-    """A number of each of these body meshes, by mesh name; dropped when it, or an action, is edited."""
+    bodies: dict[tuple, tuple] = field(default_factory=dict)
+    """Numbers of the bodies of an armature in a scene; dropped when an edit may change them. See `scene.body_known`."""
+    surfaces: dict[str, tuple[set[str], int]] = field(default_factory=dict)
+    """What animates the shape keys of each of these body meshes, and a number of it, by mesh name; dropped when it, or an action that it
+    plays, is edited."""
     vertices: dict[str, int] = field(default_factory=dict)
     """A number of the vertices of each body mesh as they were read last, by mesh name."""
     messages: dict[str, str] = field(default_factory=dict)

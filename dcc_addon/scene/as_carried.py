@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a character is set to that moves all of its hair, strands and bones alike, as numbers of a record; see `recorded`."""
+"""What moves hair, strands and bones alike: what a character is set to, and a model, as numbers of a record; see `recorded`."""
 
 from neuralocks_core.errors import NeuralocksError
 
 from ..services.wind import Blowing
 from ..session import session
 from .armature import read
+from .as_baked import print_of
+from .paths import full, library_of
 from .recorded import number_of
 
 
@@ -22,6 +24,15 @@ def others(armature, scene) -> dict[str, int]:
         "Head Bone": number_of(_head(armature) if armature else []),
         "Unit Scale": number_of(round(scene.unit_settings.scale_length, 9)),
     }
+
+
+def model(thing, setting: str) -> int | None:
+    """A number of the model that a setting of hair, or of an armature with hair bones, names, told by what is in its file: a save in
+    another folder names it otherwise. None if that cannot be read here.
+    """
+    path = thing.path_resolve(setting).strip()
+    held = print_of(full(path, library_of(thing, setting)))
+    return None if path and not held else number_of([bool(path), held])
 
 
 def _head(armature) -> list[float]:

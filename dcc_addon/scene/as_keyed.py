@@ -4,7 +4,6 @@ showing these as they were.
 """
 
 from . import actions, as_baked, as_carried, recorded
-from .paths import full, library_of
 
 KEY = "neuralocks_keyed"
 """The property of the action: a number for each part."""
@@ -37,18 +36,8 @@ def _numbers(armature, scene) -> dict[str, int]:
     own = armature.neuralocks_character
     return {
         "Motion": recorded.number_of(round(own.rig_motion, 6)),
-        "Model": _model(armature),
+        "Model": as_carried.model(armature, "neuralocks_character.rig_model"),
         "Chains": recorded.number_of(own.chains),
         "wind": as_carried.wind(armature),
         **as_carried.others(armature, scene),
     }
-
-
-def _model(armature) -> int | None:
-    """A number of the model that is named, told by what is in its file: a save in another folder names it otherwise. None if that
-    cannot be read here.
-    """
-    setting = "neuralocks_character.rig_model"
-    path = armature.path_resolve(setting).strip()
-    held = as_baked.print_of(full(path, library_of(armature, setting)))
-    return None if path and not held else recorded.number_of([bool(path), held])

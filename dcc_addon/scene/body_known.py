@@ -1,34 +1,64 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bodies that hair is kept out of, as a number of a record; see `recorded`. The panel asks in every redraw, and looking for them in
-a large scene, or reading a large one, takes longer than that may take: both are done again only after an edit.
+"""The bodies that hair is kept out of, as numbers of a record; see `recorded`. The panel asks in every redraw, and looking for them in
+a large scene, or reading a large one, takes longer than that may take: both are done again only after an edit that may change them.
 """
+
+import bpy
 
 from ..session import session
 from . import recorded
 from .animated import animated, curves_of, is_muted
 from .body import number_of, number_of_shape, weighed_so
 from .carried import bodies_of
+from .driven import number_of_drivers
+from .lookup import identity
 from .rigging import number_of_keys
+from .shapes import follows
+
+SHAPED = bpy.types.Mesh, bpy.types.Key
+_KINDS = "Armature", "Camera", "Curve", "Curves", "Image", "Light", "Material", "NodeTree", "Texture", "World"
+APART = (*SHAPED, *(getattr(bpy.types, kind) for kind in _KINDS))
+"""Data blocks that make no mesh a body by being edited, or are looked at one by one. An armature counts as edited whenever it is posed."""
 
 
-def number_of_bodies(armature, scene) -> int | None:
-    """A number that changes when the bodies of an armature become others, or one takes another shape, other weights or other keys of its
-    shape keys. Names count for nothing. None if the scene has no mesh on the armature at all, as where hair alone was appended: nobody
-    changed a body then.
+def numbers_of_bodies(armature, scene) -> tuple[int | None, int | None]:
+    """Two numbers: one that changes when the bodies of an armature become others, or one takes another shape, other weights or other keys
+    of its shape keys, and one that changes when drivers of these do. Names count for nothing. None if the scene has no mesh on the
+    armature at all, as where hair alone was appended: nobody changed a body then.
     """
     chosen = armature.neuralocks_character.body
-    key = armature.name_full, scene.name_full, chosen and chosen.name_full
+    key = identity(armature), identity(scene), chosen and identity(chosen), len(scene.objects)
     if key not in session.bodies:
-        found = sorted(_number_of(body) for body in bodies_of(armature, scene))
-        session.bodies[key] = recorded.number_of(found) if found or _has_mesh(armature, scene) else None
+        bodies = bodies_of(armature, scene)
+        shapes, driven = sorted(map(_number_of, bodies)), [number_of_drivers(body.data) for body in bodies]
+        known = bodies or _has_mesh(armature, scene)
+        numbers = recorded.number_of(shapes), recorded.number_of(sorted(filter(None, driven)))
+        session.bodies[key] = numbers if known else (None, None)
     return session.bodies[key]
 
 
-def edited(meshes, keys: bool) -> None:
-    """Something was edited: the shapes of these meshes, by name; with `keys`, perhaps those of any shape key."""
-    session.bodies.clear()
-    for name in list(session.surfaces) if keys else meshes:
+def updated(updates) -> None:
+    """Look again at what an update of Blender's may have changed; `updates` are those of a depsgraph."""
+    own, others = [update.id.original for update in updates], any(map(_regroups, updates))
+    meshes = {thing if isinstance(thing, bpy.types.Mesh) else thing.user for thing in own if isinstance(thing, SHAPED)}
+    # One that is known and takes only the shape of another pose, by drivers, is known still.
+    edited = {mesh for mesh in meshes if others or mesh.name_full not in session.surfaces or not follows(mesh, own)}
+    if others or edited:
+        session.bodies.clear()
+    replayed = _replayed({thing for thing in own if isinstance(thing, bpy.types.Action)})
+    for name in replayed.union(mesh.name_full for mesh in edited):
         session.surfaces.pop(name, None)
+
+
+def _regroups(update) -> bool:
+    """Whether an update may make other meshes bodies, or play other keys. Blender tells of every change of dependencies, and of what is
+    drawn, as one of a scene, too. A mesh that is merely moved or deformed is updated in no other way.
+    """
+    thing = update.id
+    if isinstance(thing, bpy.types.Object):
+        moved = update.is_updated_transform or update.is_updated_geometry
+        return thing.type == "MESH" and (update.is_updated_shading or not moved)
+    return not isinstance(thing, APART)
 
 
 def _has_mesh(armature, scene) -> bool:
@@ -37,10 +67,18 @@ def _has_mesh(armature, scene) -> bool:
 
 
 def _number_of(body) -> int:
-    name = body.data.name_full
-    if name not in session.surfaces:
-        session.surfaces[name] = recorded.number_of(_surface(body))
-    return session.surfaces[name]
+    """Of its surface, known as long as the same shape keys are animated: older Blenders do not tell of a driver that is removed."""
+    mesh = body.data
+    moving, known = animated(mesh.shape_keys and mesh.shape_keys.animation_data), session.surfaces.get(mesh.name_full)
+    if known is None or known[0] != moving:
+        known = session.surfaces[mesh.name_full] = moving, recorded.number_of(_surface(body))
+    return known[1]
+
+
+def _replayed(actions: set) -> set[str]:
+    """Names of the meshes whose shape keys may play one of these actions, by themselves or in a strip."""
+    played = ((keys.user.name_full, keys.animation_data) for keys in bpy.data.shape_keys if actions)
+    return {name for name, data in played if data is not None and (data.action in actions or data.nla_tracks)}
 
 
 def _surface(body) -> list:

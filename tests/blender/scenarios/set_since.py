@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What was set otherwise since hair was baked, or of another shape: the panel names it, as long as it is so."""
 
+import shutil
+import zlib
 from pathlib import Path
 
 import bpy
 
+from dcc_addon.services.sliders import SLIDERS
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, bones_at, choose, give_bone_model, make_live, needs_usd
+from tests.blender.checks import MODEL, SAME, apart, bones_at, choose, give_bone_model, make_live, needs_usd
 from tests.blender.panel import drawn
 
 
@@ -80,7 +83,7 @@ def character_set_since(folder: Path) -> None:
         scene.collection.objects.link(each)
     body.vertex_groups[0].add(range(len(mesh.vertices)), 0.5, "REPLACE")
     assert _told() == ["body"]
-    strands["neuralocks_groomed"] = " ".join(strands["neuralocks_groomed"].split(" ")[:4])
+    _record_as_older(strands, 4)
     own.loop = True
     assert not _told()
     strands.location.x += 0.1
@@ -88,6 +91,50 @@ def character_set_since(folder: Path) -> None:
     assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
     own.loop = False
     assert _told() == ["Loop"]
+
+
+def model_moved_since(folder: Path) -> None:
+    """Attached hair whose model is named from the file is told of another model, by what is in it, and not of a save in another folder; a
+    save also keeps caches that an older add-on attached, whose records name the model, from being told of one.
+    """
+    needs_usd()
+    shot, there, model = folder / "shot.blend", folder / "later", folder / "own.neuralocks"
+    there.mkdir()
+    shutil.copy(MODEL, model)
+    for parts in (None, 8, 4):
+        scenes.empty()
+        rig, strands = scenes.dancer(20, skinned=True)
+        bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+        make_live(rig, strands)
+        own, scene = strands.neuralocks_hair, bpy.context.scene
+        own.live, own.model, scene.neuralocks.output = False, "//own.neuralocks", str(folder / "hair.usdc")
+        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+        if parts:
+            _record_as_older(strands, parts)
+        assert not _told()
+        bpy.ops.wm.save_as_mainfile(filepath=str(there / "shot.blend"))
+        assert own.model == "//../own.neuralocks" and not _told(), parts
+        bpy.ops.wm.open_mainfile(filepath=str(there / "shot.blend"))
+        own = bpy.data.objects["Hair"].neuralocks_hair
+        assert not _told(), parts
+        model.rename(folder / "away.neuralocks")
+        assert not _told(), "a model that is missing here is no other one"
+        (folder / "away.neuralocks").rename(model)
+        own.resolve = not own.resolve
+        assert _told() == ["sliders"]
+        own.resolve = not own.resolve
+        for other, what in (("", ["Model"]), (str(model), [])):
+            own.model = other
+            assert _told() == what
+
+
+def _record_as_older(strands, parts: int) -> None:
+    """Give attached hair the first parts of its record, as an add-on wrote it that told the model by its name."""
+    own = strands.neuralocks_hair
+    named = [*(round(getattr(own, slider.name), 6) for slider in SLIDERS), own.resolve, own.model]
+    told = strands["neuralocks_groomed"].split(" ")[:parts]
+    told[2] = f"{zlib.crc32(repr(named).encode()):08x}"
+    strands["neuralocks_groomed"] = " ".join(told)
 
 
 def keys_set_since(folder: Path) -> None:
