@@ -72,7 +72,8 @@ def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
         return exact
     vertices, samples = rig.character.canonical(patch.body.points), patch.samples
     found = nearest(samples.index(vertices), points)
-    normals, offsets = samples.planes(found, points, vertices[None], samples.normals(vertices)[None])
+    read = (values[None, samples.corners] for values in (vertices, samples.normals(vertices)))
+    normals, offsets = samples.planes(found, points, *read)
     return np.minimum(exact, np.einsum("vi,vi->v", points, normals) - offsets)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random neck poses and body shapes for rigged mesh hair, with the body around the head of each (paper section 4.4)."""
+"""Random neck poses and body shapes for rigged mesh hair, with what is near of the body around the head of each (paper section 4.4)."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -34,7 +34,6 @@ class PosePool:
         moment: the index of each pose's moment, (P,).
         relative: neck and upper chest relative to the head, from the bind pose, canonical, (P, 2, 3, 3).
         shapes: blend shape weights of each, (P, B).
-        bodies: vertices of the body around the head of each, (P, V, 3) float32 [m], canonical; None without one.
     """
 
     def __init__(
@@ -49,10 +48,12 @@ class PosePool:
         self.relative = np.empty((count, 2, 3, 3))
         self._patch = BodyPatch.of(rig, KEPT)
         self.shapes = np.zeros((count, len(self._patch.body.shapes) if self._patch else 0))
-        self.bodies = None
         if self._patch:
-            self.bodies, self._normals = np.empty((2, count, len(self._patch.body.points), 3), np.float32)
+            # Of a whole body of 90,000 vertices, 512 poses are a gigabyte.
+            self._corners, self._normals = np.empty((2, count, len(self._patch.samples.corners), 3), np.float32)
             self._index = np.empty((count, 4, KEPT), np.float32)
+            self._joints = np.unique(self._patch.body.joint_indices)
+            self._skinning = np.empty((count, len(self._joints), 4, 4))
         self.renew(count)
 
     @property
@@ -78,10 +79,17 @@ class PosePool:
             return rows
         self.shapes[rows] = np.clip(self._rng.normal(0, 0.35, (count, self.shapes.shape[1])), -0.8, 0.8)
         skinning = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)[:, None] @ skinning
-        for row, matrices in zip(rows, skinning):
-            self.bodies[row] = body = self._patch.body.posed(matrices, self.shapes[row])
-            self._normals[row], self._index[row] = self._patch.samples.normals(body), self._patch.samples.index(body)
+        self._skinning[rows] = skinning[:, self._joints]
+        samples = self._patch.samples
+        for row in rows:
+            body = self._posed(row)
+            self._corners[row], self._normals[row] = body[samples.corners], samples.normals(body)[samples.corners]
+            self._index[row] = samples.index(body)
         return rows
+
+    def body(self, pose: int) -> np.ndarray:
+        """Vertices of the body around the head in a pose, (V, 3) float32 [m], canonical."""
+        return self._posed(pose).astype(np.float32)
 
     def gravity(self, poses: np.ndarray) -> np.ndarray:
         """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs
@@ -105,7 +113,7 @@ class PosePool:
         """
         found = np.concatenate([nearest(self._index[pose], some) for pose, some in zip(poses, points)])
         normals, offsets = self._patch.samples.planes(
-            found, points.reshape(-1, 3), self.bodies, self._normals, np.repeat(poses, points.shape[1])
+            found, points.reshape(-1, 3), self._corners, self._normals, np.repeat(poses, points.shape[1])
         )
         return normals.reshape(points.shape), offsets.reshape(points.shape[:2])
 
@@ -117,7 +125,7 @@ class PosePool:
 
         def measure(row: int) -> None:
             result[row, near[row]] = proven_distances(
-                self.bodies[poses[row]], self._patch.body.triangles, points[row][near[row]]
+                self.body(poses[row]), self._patch.body.triangles, points[row][near[row]]
             )
 
         with ThreadPoolExecutor(cores()) as pool:
@@ -125,6 +133,11 @@ class PosePool:
             for done, _ in enumerate(pool.map(measure, rows), 1):
                 progress(done, len(rows), "measuring what lies in the body")
         return result
+
+    def _posed(self, pose: int) -> np.ndarray:
+        matrices = np.zeros((len(self.rig.character.skeleton.names), 4, 4))
+        matrices[self._joints] = self._skinning[pose]
+        return self._patch.body.posed(matrices, self.shapes[pose])
 
 
 def _random_skinning(character, count, rng) -> np.ndarray:

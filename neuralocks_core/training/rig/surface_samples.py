@@ -41,6 +41,7 @@ class SurfaceSamples:
     Attributes:
         faces: the triangles around each place, its own first, (count, AROUND).
         triangles: as given.
+        corners: the vertices of all these triangles (U,), at most 3 * AROUND * count: all that `planes` reads.
         open: whether a part of a triangle, in the order of `closest_on_triangle`, lies on an edge that no other shares,
             (F, 7): across it, nothing says what is inside.
     """
@@ -55,6 +56,9 @@ class SurfaceSamples:
         close = tree.query(_places(points[triangles[owners]], shares), min(CLOSE, len(dense)))[1]
         self.faces = np.stack([_distinct(own, near) for own, near in zip(owners, dense[close])])
         self._shares = shares
+        self.corners, own = np.unique(triangles[self.faces], return_inverse=True)
+        self._own = np.zeros_like(triangles)  # each corner's place among them
+        self._own[self.faces] = own.reshape(*self.faces.shape, 3)
 
     def index(self, points: np.ndarray) -> np.ndarray:
         """What `nearest` takes of vertices (V, 3) [m]: x, y, z and x.x of each place, (4, count) float32. A matrix product of these
@@ -76,21 +80,21 @@ class SurfaceSamples:
         Args:
             found: for each point the `nearest` place (N,).
             points: (N, 3) [m].
-            vertices, normals: of several poses, (P, V, 3) each; normals say which side is outside.
+            vertices, normals: of the `corners` in several poses, (P, U, 3) each; normals say which side is outside.
             which: the pose of each point, (N,).
 
         Returns:
             unit normals (N, 3) and offsets (N,) [m]: the distance of x is n.x - d.
         """
         which, face = np.broadcast_to(which, np.shape(found)), self.faces[found, 0]
-        place, part = closest_on_triangle(points, *vertices[which, self.triangles[face].T])
+        place, part = closest_on_triangle(points, *vertices[which, self._own[face].T])
         near = np.flatnonzero(np.square(points - place).sum(axis=1) < NEAR**2)
         some = self.faces[found[near]]
-        corners = np.moveaxis(vertices[which[near, None, None], self.triangles[some]], 2, 0)
+        corners = np.moveaxis(vertices[which[near, None, None], self._own[some]], 2, 0)
         places, parts = closest_on_triangle(points[near, None], *corners)
         rows, least = np.arange(len(near)), np.square(points[near, None] - places).sum(axis=-1).argmin(axis=1)
         place[near], part[near], face[near] = places[rows, least], parts[rows, least], some[rows, least]
-        out = np.einsum("nc,nci->ni", _CORNERS[part], normals[which[:, None], self.triangles[face]])
+        out = np.einsum("nc,nci->ni", _CORNERS[part], normals[which[:, None], self._own[face]])
         away = points - place
         length = np.linalg.norm(away, axis=1, keepdims=True)
         inside = np.einsum("ni,ni->n", away, out)[:, None] < 0

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small rigs by hand."""
 
+from dataclasses import replace
+
 import numpy as np
+import trimesh
 
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig import RigModel, SkinnedMesh, find_chains, rig_spec
 from neuralocks_core.rig.network import held_features
+from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_quaternion
+from neuralocks_core.skinned_body import Body
 from tests.rig_models import random_rig_model
 
 
@@ -38,6 +43,33 @@ def tail(name="hair", joints=3, at=(0, 1.6, -0.1), step=(0, -0.06, -0.01), paren
     for i in range(joints):
         rows.append((f"{name}_{i + 1}", rows[-1][0] if rows else parent, tuple(np.add(at, np.multiply(i, step)))))
     return rows
+
+
+def branched() -> HairRig:
+    """A chain that forks, with a few skinned points."""
+    fork = tail("hair_a", 3, at=(0.05, 1.44, -0.1), parent="hair_2")
+    fork += tail("hair_b", 3, at=(-0.05, 1.44, -0.1), parent="hair_2")
+    who = character([*tail("hair", 2), *fork])
+    chains = find_chains(who)
+    rng = np.random.default_rng(0)
+    weights = rng.random((7, len(chains) + 1))
+    return HairRig(
+        who, chains, rng.normal(0, 0.1, (7, 3)), weights / weights.sum(1, keepdims=True), np.zeros((0, 3), int)
+    )
+
+
+def with_balls(fine: int = 3) -> tuple[HairRig, float]:
+    """A body of two balls, around the head and in the chest, each a `fine` times divided icosahedron, and a hanging chain; and their
+    radius.
+    """
+    rig = branched()
+    who, radius = rig.character, 0.12
+    ball = trimesh.creation.icosphere(fine, radius)
+    names = [name.rsplit("/", 1)[-1] for name in who.skeleton.names]
+    points = np.concatenate([ball.vertices + (0, 1.62, 0.02), ball.vertices + (0, 1.3, 0)])
+    faces = np.concatenate([ball.faces, ball.faces + len(ball.vertices)])
+    joints = np.repeat([names.index("head"), names.index("chest")], len(ball.vertices))[:, None]
+    return replace(rig, character=replace(who, body=Body(points, faces, joints, np.ones_like(joints, float)))), radius
 
 
 def skin(who: Character, joints: dict[str, tuple]) -> SkinnedMesh:

@@ -15,7 +15,8 @@ RADIUS = 0.12
 
 def distances(samples: SurfaceSamples, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
     found = nearest(samples.index(vertices), points)
-    normals, offsets = samples.planes(found, points, vertices[None], samples.normals(vertices)[None])
+    read = (values[None, samples.corners] for values in (vertices, samples.normals(vertices)))
+    normals, offsets = samples.planes(found, points, *read)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
     return (points * normals).sum(axis=1) - offsets
 

@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-import trimesh
 
 torch = pytest.importorskip("torch")
 
@@ -17,30 +16,15 @@ from neuralocks_core.rig.kinematics import bone_ends, half_turns, pose_chains, s
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rotation import from_quaternion, from_vector
-from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig import report as rig_report
-from neuralocks_core.training.rig.body import posed_distances, rest_distances
 from neuralocks_core.training.rig.dynamic import train_dynamic
 from neuralocks_core.training.rig.energy import RigEnergy, bounded_turns
 from neuralocks_core.training.rig.motion import SPRINGS, motion_report
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.poses import PosePool
 from neuralocks_core.training.rig.static import train_static
-from tests.core.rig.builders import character, random_features, random_model, tail
-
-
-def branched() -> HairRig:
-    """A chain that forks, with a few skinned points."""
-    fork = tail("hair_a", 3, at=(0.05, 1.44, -0.1), parent="hair_2")
-    fork += tail("hair_b", 3, at=(-0.05, 1.44, -0.1), parent="hair_2")
-    who = character([*tail("hair", 2), *fork])
-    chains = find_chains(who)
-    rng = np.random.default_rng(0)
-    weights = rng.random((7, len(chains) + 1))
-    return HairRig(
-        who, chains, rng.normal(0, 0.1, (7, 3)), weights / weights.sum(1, keepdims=True), np.zeros((0, 3), int)
-    )
+from tests.core.rig.builders import branched, character, random_features, random_model, tail, with_balls
 
 
 def test_torch_and_numpy_pose_alike():
@@ -136,107 +120,6 @@ def test_turns_past_half_a_round_go_on_from_the_other_side():
     ahead = np.einsum("tij,tj->ti", heads[0, :, :3, :3] @ from_quaternion(turns), np.tile([0, 0, -1.0], (60, 1)))
     assert np.abs(ahead - [0, 0, -1]).max() < 0.05
     assert (turns[:, 0] >= 0).all() and turns[:, 0].min() < 0.05
-
-
-def with_balls() -> tuple[HairRig, float]:
-    """A body of two balls, around the head and in the chest, and a hanging chain; and their radius."""
-    rig = branched()
-    who, radius = rig.character, 0.12
-    ball = trimesh.creation.icosphere(3, radius)
-    names = [name.rsplit("/", 1)[-1] for name in who.skeleton.names]
-    points = np.concatenate([ball.vertices + (0, 1.62, 0.02), ball.vertices + (0, 1.3, 0)])
-    faces = np.concatenate([ball.faces, ball.faces + len(ball.vertices)])
-    joints = np.repeat([names.index("head"), names.index("chest")], len(ball.vertices))[:, None]
-    return replace(rig, character=replace(who, body=Body(points, faces, joints, np.ones_like(joints, float)))), radius
-
-
-def test_depths_in_the_body_are_those_of_balls():
-    """Wherever a point is: a nearest plane, or only a part of the surface, may take outside for inside."""
-    rig, radius = with_balls()
-    pool = PosePool(rig, 4, np.random.default_rng(0))
-    rng = np.random.default_rng(1)
-    count = len(pool.bodies[0]) // 2
-    points = rng.uniform(-0.4, 0.4, (4, 4000, 3)).astype(np.float32)
-    found = pool.distances(np.arange(4), points)
-    for pose in range(4):
-        centres = [pool.bodies[pose][:count].mean(0), pool.bodies[pose][count:].mean(0)]
-        wanted = np.min([np.linalg.norm(points[pose] - c, axis=1) - radius for c in centres], axis=0)
-        assert (found[pose][wanted > 1e-3] > 0).all()
-        inside = wanted < -1e-3
-        assert inside.sum() > 50 and np.abs(found[pose] - wanted)[inside].max() < 2e-3
-
-
-def test_margins_are_those_at_rest_at_most():
-    """Hair that rests on the body as modelled is not pushed away, whatever shapes the body may take."""
-    rig, radius = with_balls()
-    centre = np.array([0, 0.07, 0.02])  # of the head's ball, from the head joint
-    points = centre + np.array([[radius + d, 0, 0] for d in (-0.004, 0.003, 0.02)])
-    rig = replace(rig, points=points, weights=rig.weights[:3])
-    np.testing.assert_allclose(rest_distances(rig, points), [-0.004, 0.003, 0.02], atol=1e-3)
-    np.testing.assert_allclose(RigEnergy(rig, RigMaterial()).margins, [-0.004, 0.003, 0.008], atol=1e-3)
-
-
-def test_hair_that_rests_in_a_hat_is_not_pushed():
-    """Also beside the head, whose skin in the hat is nearest and faces it."""
-    rig, radius = with_balls()
-    head, hat = rig.character.body, trimesh.creation.box((0.3, 0.3, 0.3))
-    hat.apply_translation((0, 1.77, 0.02))
-    body = Body(
-        np.concatenate([head.points, hat.vertices]),
-        np.concatenate([head.triangles, hat.faces + len(head.points)]),
-        np.concatenate([head.joint_indices, np.repeat(head.joint_indices[:1], len(hat.vertices), axis=0)]),
-        np.concatenate([head.joint_weights, np.ones((len(hat.vertices), 1))]),
-    )
-    points = np.array([[0, 0.07 + radius + 0.01, 0.02]])
-    rig = replace(rig, character=replace(rig.character, body=body), points=points, weights=rig.weights[:1])
-    assert rest_distances(rig, points)[0] == pytest.approx(-0.13, abs=1e-3)
-    assert RigEnergy(rig, RigMaterial()).margins < 0
-
-
-def test_hair_over_the_faces_of_a_coarse_body_is_not_thrown_off():
-    """There the plane of the nearest vertex is centimetres above the surface."""
-    rig, _ = with_balls()
-    body, ball = rig.character.body, trimesh.creation.icosphere(1, 0.12)
-    points = np.concatenate([ball.vertices + (0, 1.62, 0.02), ball.vertices + (0, 1.3, 0)])
-    joints = np.repeat([body.joint_indices[0], body.joint_indices[-1]], len(ball.vertices), axis=0)
-    body = Body(
-        points, np.concatenate([ball.faces, ball.faces + len(ball.vertices)]), joints, np.ones_like(joints, float)
-    )
-    rig = replace(rig, character=replace(rig.character, body=body))
-    over = ball.triangles_center + 0.004 * ball.face_normals + [0, 0.07, 0.02]
-    rig = replace(rig, points=over, weights=np.eye(1, len(rig.chains) + 1).repeat(len(over), 0))
-    assert (np.abs(rest_distances(rig, over) - 0.004) < 1e-3).all()
-    pool = PosePool(rig, 4, np.random.default_rng(0))
-    rest = torch.zeros(4, len(rig.chains), 4)
-    rest[..., 0] = 1
-    poses = np.arange(4)
-    collision = RigEnergy(rig, RigMaterial()).parts(pool, poses, rest, pool.gravity(poses))[1]
-    assert collision.max() < 0.1, collision
-
-
-def test_depths_in_motion_are_those_of_the_bind_pose_there():
-    """Wherever the character stands: canonical points keep their distance."""
-    rig, radius = with_balls()
-    points = np.array([0, 0.07, 0.02]) + np.array([[radius + d, 0, 0] for d in (-0.004, 0.003, 0.02)])
-    rig = replace(rig, points=points, weights=rig.weights[:3])
-    moved = np.eye(4)
-    moved[:3, :3], moved[:3, 3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], (3, 1, -2)
-    joints = np.stack([rig.character.skeleton.bind, moved @ rig.character.skeleton.bind])
-    found = posed_distances(rig, joints, np.stack([points, points]))
-    np.testing.assert_allclose(found, [rest_distances(rig, points)] * 2, atol=1e-5)
-
-
-def test_renewed_poses_take_the_place_of_the_oldest():
-    """And the others stay."""
-    rig, _ = with_balls()
-    pool = PosePool(rig, 8, np.random.default_rng(0))
-    before = pool.relative.copy()
-    for changed in ([0, 1, 2], [3, 4, 5], [6, 7, 0]):
-        kept = np.setdiff1d(np.arange(8), changed)
-        pool.renew(3)
-        same = (pool.relative == before).all(axis=(1, 2, 3))
-        assert same[kept].all() and not same[changed].any()
-        before = pool.relative.copy()
 
 
 def test_a_teleport_and_other_frame_rates():
