@@ -104,10 +104,12 @@ def show_rest(scene) -> None:
 
 
 def forget_gone() -> None:
-    """Drop messages about objects that were renamed or deleted: another object may get such a name."""
-    for told in (session.messages, session.misrendered, session.cards):
-        for name in [name for name in told if find(name) is None]:
-            del told[name]
+    """Drop messages about objects that were renamed or deleted: another object may get such a name. So is hair that was prepared for
+    one: a large groom holds hundreds of megabytes.
+    """
+    for kept in (session.messages, session.misrendered, session.cards, session.hairs):
+        for name in [name for name in kept if find(name) is None]:
+            del kept[name]
 
 
 def forget_ended() -> None:
