@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bake to USD, bake and attach, report card."""
 
-import errno
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -11,74 +10,25 @@ from bpy.props import StringProperty
 
 from neuralocks_core.errors import NeuralocksError
 
+from ..bake_files import files_of, output_path, owner_of, shot_beside
 from ..bake_groups import grouped
 from ..live import refresh
 from ..live_strands import show_rest
 from ..scene import attach, imported
 from ..scene.carried import hairs_of
 from ..scene.export import write_shot
-from ..scene.lookup import find, named
+from ..scene.lookup import named
 from ..scene.muting import on_top
-from ..scene.paths import absolute, beside, usual_output
 from ..scene.riding import on_hair_bone
 from ..scene.shown import in_renders
 from ..services.names import file_label
-from ..services.overwriting import check_ours, untaken
+from ..services.overwriting import untaken
 from ..services.panel_errors import for_the_panel, with_objects
 from ..services.temporary import temporary_folder
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
 from .base import FILE_ONCE, Stepwise, sampling, shown_armature, shown_hair, tell
-
-
-def output_path(path: str) -> str:
-    """Absolute path of a bake; if none is chosen, `usual_output`.
-
-    Raises:
-        NeuralocksError: it is relative to a file that is not saved, it is a folder, its folder cannot be written, or its name is too
-            long.
-    """
-    chosen = absolute(path if path.strip() else usual_output())
-    full = os.path.abspath(chosen)
-    if chosen.endswith(("/", os.sep)) or os.path.isdir(full):
-        raise NeuralocksError(f"{path}: this is a folder; name a file in it")
-    if not full.lower().endswith((".usd", ".usda", ".usdc")):
-        full += ".usdc"
-    folder = next((p for p in Path(full).parents if os.path.isdir(p)), None)  # missing folders are made
-    if folder is None or not os.access(folder, os.W_OK):
-        raise NeuralocksError(f"{full}: the folder cannot be written; choose another one")
-    try:
-        os.lstat(shot_beside(Path(full)))
-    except OSError as error:
-        if error.errno == errno.ENAMETOOLONG:
-            raise NeuralocksError(f"{full}: its name is too long for this disk; choose a shorter one") from None
-    return full
-
-
-def shot_beside(out: Path) -> Path:
-    """The shot that a bake goes over: the character at rest and in motion."""
-    return out.with_name(f"{out.stem}_shot.usdc")
-
-
-def owner_of(out: Path, character: str) -> str:
-    """Whom an existing bake `out`, or its shot, belongs to, if not to the character of this full name in this Blender file: what was
-    imported from it, another character, or another Blender file that plays it. Otherwise empty.
-    """
-    from usd.assets.own_layers import character_of, player_of
-
-    shot = shot_beside(out)
-    if any(attach.is_imported(str(path)) for path in (out, shot)):
-        return "what was imported from it"
-    if not shot.is_file():
-        return ""
-    other, player = character_of(shot), player_of(shot)
-    armature = find(character)
-    own = any(thing.neuralocks_hair.armature == armature for thing in attach.players(str(out)))  # renamed since
-    there = os.path.isfile(os.path.normpath(shot.parent / player))  # as it was written, whatever folder is a link
-    if player and player != beside(shot) and (there or not own):  # it may have been moved
-        return f"{player}, which plays it"
-    return "" if own or other in ("", character) else f"another character, {other}"
 
 
 def frame_range(scene) -> tuple[int, int]:
@@ -131,7 +81,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
     notes += [f"{hair.name_full}: {doubt}" for hair in hairs if (doubt := imported.doubt(hair))]
     character, label, subframes = armature.name_full, file_label(armature.name), scene.neuralocks.subframes
     yield from loading("usd.baking.bake", "usd.assets.own_layers", "usd.assets.scene_writer")
-    groups, kept = _with_files(looks, Path(full), character, label)
+    groups, kept = files_of(looks, Path(full), character, label)
     notes += kept
     outs = [out for out, _, _ in groups]
     # If hair has velocities, Cycles blurs it along straight lines, and leaves the samples between the frames unread.
@@ -155,29 +105,6 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
     return Baked(baked, list(dict.fromkeys(notes)), written, (first, last))
 
 
-def _with_files(looks, path: Path, character: str, label: str) -> tuple[list[tuple], list[str]]:
-    """The (file to write, look, names) of each look, and the notes: if `path` belongs to something else, files have the `label` in their
-    names.
-
-    Raises:
-        NeuralocksError: hair that is not in the bake plays a file, or we did not make it.
-    """
-    from usd.assets.own_layers import is_own
-
-    free = untaken(path, label, lambda path: any(owner_of(out, character) for out in _outs(path, len(looks))))
-    notes = []
-    if free != path:
-        owner = next(filter(None, (owner_of(out, character) for out in _outs(path, len(looks)))))
-        notes.append(f"{path}: it belongs to {owner}, and is kept; this bake is written to {free.name}")
-    outs = _outs(free, len(looks))
-    groups = [(out, *group) for out, group in zip(outs, looks)]
-    for out, _, names in groups:
-        if others := [thing.name_full for thing in attach.players(str(out)) if thing.name_full not in names]:
-            raise NeuralocksError(f"{out}: {others[0]} plays this file, and is not in this bake; choose another file")
-    check_ours([*outs, *map(shot_beside, outs)], is_own)
-    return groups, notes
-
-
 def _baking(out: Path, look, begin: float, end: float, **options):
     """Steps, from share `begin` to `end` of the work, of baking the shot beside `out` with the sliders of a look; returns notes."""
     from usd.baking.bake import bake
@@ -197,11 +124,6 @@ def _baking(out: Path, look, begin: float, end: float, **options):
     )
     result = yield from job.steps(begin, end)
     return result.notes
-
-
-def _outs(path: Path, count: int) -> list[Path]:
-    """The files of a bake with this many looks."""
-    return [path if count == 1 else path.with_name(f"{path.stem}_{n + 1}{path.suffix}") for n in range(count)]
 
 
 class NEURALOCKS_OT_bake(Stepwise, bpy.types.Operator):

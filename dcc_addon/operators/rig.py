@@ -9,6 +9,7 @@ from bpy.props import StringProperty
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
+from ..bake_files import output_path, owner_of, shot_beside
 from ..blowing import blowing, in_core
 from ..live import refresh
 from ..live_rig import bind, rest, show_rest
@@ -27,7 +28,7 @@ from ..services.panel_errors import for_the_panel, with_objects
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
-from .bake import frame_range, output_path, owner_of, shot_beside
+from .bake import frame_range
 from .base import FILE_ONCE, Hardened, Stepwise, sampled_once, sampling, shown_armature, tell
 
 
