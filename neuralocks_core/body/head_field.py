@@ -9,6 +9,7 @@ import numpy as np
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.hollows import filled
+from neuralocks_core.body.moving_skin import Skin
 from neuralocks_core.sums import dot
 
 CELL = 0.005
@@ -69,7 +70,7 @@ class HeadField:
     def __init__(self, points: np.ndarray, triangles: np.ndarray, still: np.ndarray):
         whole = Collider(points, triangles)
         fixed = still[whole.triangles].all(axis=1)
-        self.moving = whole.triangles[~fixed]
+        self.moving, self._points = whole.triangles[~fixed], whole.points
         self.cell, self.low = CELL, np.zeros(3)
         self.values = np.full((2, 2, 2), np.inf, np.float32)
         if not fixed.any():
@@ -84,10 +85,21 @@ class HeadField:
         # Nodes nearest to something that moves are unknown, and so is all that is interpolated from them.
         self.values = np.where(fixed[nearest], value, np.inf).astype(np.float32).reshape(size)
 
+    @cached_property
+    def skin(self) -> Skin | None:
+        """Samples of the part that moves, None if there is none. Each groom of a head needs them, too, and so does each bake."""
+        if not len(self.moving):
+            return None
+        used, triangles = np.unique(self.moving, return_inverse=True)
+        return Skin(self._points[used], triangles.reshape(-1, 3))
+
     @property
     def size(self) -> int:
         """Bytes of its arrays."""
-        return self.values.nbytes + self.moving.nbytes
+        skin = vars(self).get("skin")
+        return sum(
+            each.nbytes for each in (self.values, self.moving, self._points, *(vars(skin).values() if skin else ()))
+        )
 
     def near(self, reach: float) -> np.ndarray:
         """Nodes (N, 3) [m] that are inside, or less than `reach` outside."""

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse
 
 from neuralocks_core.body.head_field import head_field
-from neuralocks_core.body.moving_skin import SKIN, Box, PosedSkin, Skin
+from neuralocks_core.body.moving_skin import SKIN, Box, PosedSkin
 from neuralocks_core.native.body import Box as NativeBox
 from neuralocks_core.native.keep_out import KeepOut
 from neuralocks_core.rotation import transformed
@@ -38,10 +38,9 @@ class NearBody:
         # A point is never farther than 1.8 node distances from the nearest node of its own cell.
         near = self.head.near(self.box.cell + 1.8 * self.head.cell)
         self.marks[self.box.cells(near[self.box.inside(near, 1)])] = HEAD
-        self.skin: Skin | None = None
-        if len(self.head.moving):
+        self.skin = self.head.skin
+        if self.skin:
             used, triangles = np.unique(self.head.moving, return_inverse=True)
-            self.skin = Skin(points[used], triangles.reshape(-1, 3))
             rows = np.repeat(np.arange(len(used)), body.joint_indices.shape[1])
             columns, weights = body.joint_indices[used].ravel(), body.joint_weights[used].ravel()
             count = int(body.joint_indices.max()) + 1
