@@ -12,10 +12,10 @@ import warnings
 import numpy as np
 import pytest
 
-pytest.importorskip("warp", reason="the reference needs warp")
-newton = pytest.importorskip("newton", reason="the comparison needs newton: pip install 'neuralocks[compare]'")
 if not os.environ.get("NEURALOCKS_COMPARE"):
     pytest.skip("newton's kernels take minutes to compile: set NEURALOCKS_COMPARE=1", allow_module_level=True)
+pytest.importorskip("warp", reason="the reference needs warp")
+newton = pytest.importorskip("newton", reason="the comparison needs newton: pip install 'neuralocks[compare]'")
 import warp as wp
 
 from neuralocks_core.reference import simulate
