@@ -24,6 +24,8 @@ from neuralocks_core.training.selfsupervised import train_on_moments
 
 STEPS_EACH = 10
 """Steps per further clip, in a run with a given number of steps: about as many as two cores take while one clip is made."""
+LOOK_AGAIN = 0.2
+"""How long to wait before looking for further clips [s]."""
 
 
 def method_of(
@@ -146,4 +148,4 @@ def wait(farm: RolloutFarm, count: int, say: Callable[[int, int], None], numbere
         if farm.failed() or not alive:
             raise farm.failure()
         say(there, count)
-        time.sleep(0.2)
+        time.sleep(LOOK_AGAIN)

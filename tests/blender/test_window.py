@@ -27,12 +27,12 @@ def test_panel_in_a_window(random_model, tmp_path):
         "-p",
         "0",
         "0",
-        "1280",
-        "960",
+        "800",
+        "640",
         "--python",
         str(Path(__file__).with_name("window.py")),
     ]
-    command = ["xvfb-run", "-a", "-s", "-screen 0 1280x960x24", *window, "--", str(tmp_path)]
+    command = ["xvfb-run", "-a", "-s", "-screen 0 800x640x24", *window, "--", str(tmp_path)]
     environment = os.environ | {
         "PYTHONPATH": str(packages),
         "NEURALOCKS_TEST_MODEL": str(random_model),

@@ -43,6 +43,7 @@ def build():
     for area in bpy.context.window_manager.windows[0].screen.areas:
         if area.type == "VIEW_3D":
             area.spaces.active.show_region_ui = True
+            area.spaces.active.shading.type = "WIREFRAME"
     state["rest"] = shown()
 
 
@@ -172,5 +173,7 @@ def tick():
     os._exit(0)
 
 
+# No graphics card draws here: most of the time would go into pixels of the scene.
+bpy.context.preferences.system.viewport_aa = "OFF"
 bpy.context.preferences.view.show_splash = False
 bpy.app.timers.register(tick, first_interval=2.0)

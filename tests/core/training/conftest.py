@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small scenes and budgets for the tests of trainings."""
 
+from pathlib import Path
+
 import pytest
 
 from tests.core.rigs import person, straight_hair
@@ -19,3 +21,46 @@ def few(monkeypatch):
     """Trainings begin after four simulations, and are measured on two."""
     monkeypatch.setattr("neuralocks_core.training.methods.FIRST", 4)
     monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
+
+
+@pytest.fixture
+def in_one_process(monkeypatch):
+    """Trainings make their simulations themselves: each process of a farm would import warp first, which takes seconds, and a
+    training has two.
+    """
+    monkeypatch.setattr("neuralocks_core.training.train.RolloutFarm", _Farm)
+    monkeypatch.setattr("neuralocks_core.training.methods.LOOK_AGAIN", 0.0)
+
+
+class _Farm:
+    """Stands in for a farm: whenever its files are looked for, one more is there."""
+
+    alive = True
+
+    def __init__(self, scene, folder: Path, count: int, _processes: int = 1):
+        self.count, self._scene, self._maker = count, scene, None
+        self._paths = [folder / f"{index:06d}.npz" for index in range(count)]
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def files(self, first=None):
+        for index, path in enumerate(self._paths):
+            if not path.exists():
+                self._make(index, path)
+                break
+        return [path for path in self._paths[:first] if path.exists()]
+
+    def failed(self):
+        return False
+
+    def _make(self, index: int, path: Path) -> None:
+        from neuralocks_core.training.farm import save
+        from neuralocks_core.training.rollouts import RolloutMaker
+
+        self._maker = self._maker or RolloutMaker(self._scene)
+        save(path, self._maker.make(index))

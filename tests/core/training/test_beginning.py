@@ -204,7 +204,7 @@ def test_what_was_trained_is_not_lost_to_a_wrong_word(tmp_path):
     assert (work / "checkpoint.npz").read_bytes() == b"hours"
 
 
-def test_a_training_goes_on_where_the_model_was(few, tmp_path, monkeypatch):
+def test_a_training_goes_on_where_the_model_was(few, in_one_process, tmp_path, monkeypatch):
     """Without a step it is as good as the model; killed, it does not need the model's file; its card tells both."""
     scene = TrainingScene(person(), (straight_hair(),), frames=40, strands=8)
     first = RegressionOptions(steps=60, clips=16, strands=6, rate=4e-3)

@@ -212,7 +212,7 @@ def test_the_papers_own_settings_train(pool, inputs):
     assert states[-1].done == 1.0 and states[-1].step == 3
 
 
-def test_one_call_trains_the_papers_way_and_says_so(pool, tmp_path):
+def test_one_call_trains_the_papers_way_and_says_so(pool, few, in_one_process, tmp_path):
     pytest.importorskip("warp", reason="the gauge compares with the solver")
     from neuralocks_core import model
     from neuralocks_core.training.train import train_strands

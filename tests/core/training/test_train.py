@@ -110,7 +110,9 @@ def test_held_out_motion_is_never_trained_on(scene):
     assert lengths & set(map(float, taken[0])) and not lengths & set(map(float, taken[1]))
 
 
-def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(scene, few, tmp_path, monkeypatch):
+def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(
+    scene, few, in_one_process, tmp_path, monkeypatch
+):
     """With a budget in seconds, each step learns from what happens to be there."""
     graphs = []
     for name, ready in (("early", 6), ("late", 0)):
@@ -193,7 +195,7 @@ def test_what_cannot_be_resumed_says_why(scene, tmp_path):
         checkpoint.load(path, {"net": torch.nn.Linear(2, 2)})
 
 
-def test_a_training_that_runs_away_is_one_line(scene, few, tmp_path):
+def test_a_training_that_runs_away_is_one_line(scene, few, in_one_process, tmp_path):
     """Steps far too large end in NaN, or in weights that no model file holds: never in a model, nor in a checkpoint."""
     out, options = tmp_path / "hair.neuralocks", RegressionOptions(steps=30, rate=1e12, clips=2, strands=2)
     with pytest.raises(NeuralocksError, match="--set rate") as caught:
@@ -203,7 +205,7 @@ def test_a_training_that_runs_away_is_one_line(scene, few, tmp_path):
         train_strands(scene, out, options, rollouts=2, resume=True)
 
 
-def test_a_training_is_resumed_as_it_was_begun_only(scene, few, tmp_path):
+def test_a_training_is_resumed_as_it_was_begun_only(scene, few, in_one_process, tmp_path):
     """Weights of another output or method fit in shape: hair would be wrong, or the optimiser would break. Simulations belong to
     the strands and the motion that they were made from; two trainings in one folder would mix theirs.
     """
