@@ -18,7 +18,7 @@ import plain_errors  # noqa: F401
 import torch
 
 from neuralocks_core.boundary_spec import BoundarySpec
-from neuralocks_core.network_sizes import PLAIN_STRAND, STRAND
+from neuralocks_core.network_sizes import LOCK_CODES, PLAIN_STRAND, STRAND
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
@@ -75,7 +75,7 @@ def run(scene: TrainingScene, work: Path, rows: list[str], budget: dict, rollout
             if spec != scene.spec:
                 maker = RolloutMaker(which)
                 bank.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files[name], bank.rollouts)]
-            for part, unread in (("locks", slice(34, 66)), ("points", slice(PLAIN_STRAND, STRAND))):
+            for part, unread in (("locks", LOCK_CODES), ("points", slice(PLAIN_STRAND, STRAND))):
                 if not change.get(part, True):
                     for inputs in bank.inputs:
                         inputs[:, unread] = 0

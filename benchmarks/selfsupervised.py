@@ -13,50 +13,67 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import plain_errors  # noqa: F401
 import torch
 
 from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.network_sizes import LOCK_CODES
 from neuralocks_core.physics.bend_twist import Cosserat
+from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.methods import MomentMethod
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import RolloutBank
+from neuralocks_core.training.regression import RolloutBank, predicted
 from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
 from neuralocks_core.training.selfsupervised import paper_boundary
 
 OURS, PAPER = SelfSupervisedOptions(), SelfSupervisedOptions.paper()
-ROWS: dict[str, tuple[SelfSupervisedOptions, BoundarySpec | None]] = {
-    "defaults": (OURS, None),
-    "the paper, all of it": (PAPER, paper_boundary()),
-    "the paper, direction output": (replace(PAPER, output="direction"), paper_boundary()),
-    "detached inertia only": (replace(OURS, undetached=0.0), None),
-    "displacement output": (replace(OURS, output="displacement"), None),
-    "static": (replace(OURS, static=True), None),
-    "no warm-up": (replace(OURS, warmup=0.0), None),
-    "straight transport": (replace(OURS, form=Cosserat.DIRECT), None),
-    "constant director (Quaffure)": (replace(OURS, form=Cosserat.CONSTANT), None),
-    "adhesion without rest distance": (replace(OURS, paper_adhesion=True), None),
-    "style held near the body": (replace(OURS, style=(2500.0,)), None),
-    "no self-collision": (replace(OURS, volume=0.0), None),
+
+
+class Choice(NamedTuple):
+    """A variant: its options, its boundary history if that is not the scene's, whether the network reads the code of a strand's lock."""
+
+    options: SelfSupervisedOptions
+    spec: BoundarySpec | None = None
+    locks: bool = True
+
+
+ROWS: dict[str, Choice] = {
+    "defaults": Choice(OURS),
+    "the paper, all of it": Choice(PAPER, paper_boundary()),
+    "the paper, direction output": Choice(replace(PAPER, output="direction"), paper_boundary()),
+    "detached inertia only": Choice(replace(OURS, undetached=0.0)),
+    "displacement output": Choice(replace(OURS, output="displacement")),
+    "static": Choice(replace(OURS, static=True)),
+    "no warm-up": Choice(replace(OURS, warmup=0.0)),
+    "straight transport": Choice(replace(OURS, form=Cosserat.DIRECT)),
+    "constant director (Quaffure)": Choice(replace(OURS, form=Cosserat.CONSTANT)),
+    "no adhesion": Choice(replace(OURS, adhesion=0.0)),
+    "adhesion four times as stiff": Choice(replace(OURS, adhesion=4.0)),
+    "adhesion without rest distance": Choice(replace(OURS, paper_adhesion=True)),
+    "style held near the body": Choice(replace(OURS, style=(2500.0,))),
+    "no self-collision": Choice(replace(OURS, volume=0.0)),
+    "no lock codes": Choice(OURS, locks=False),
+    "no head translation": Choice(OURS, replace(BoundarySpec(), linear="none")),
 }
-"""Variant -> options, and the boundary history if it is not the scene's."""
 
 
 def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
-    """Train and measure each variant; prints a Markdown table as it goes."""
+    """Train and measure each variant; prints a Markdown table as it goes, below hair carried rigidly."""
     coder = kept_coder(work)
     files = sorted((work / "held_out").glob("*.npz"))
-    names = "position static motion motion_static motion_ratio velocity droop penetration".split()
-    print(f"{steps} steps each, seed {scene.seed}; rigid hair: motion and velocity 1, motion ratio and droop 0\n")
-    print("| variant | s | " + " | ".join(names) + " |")
-    print("| --- |" + " ---: |" * (len(names) + 1))
-    for row in rows:
-        options, spec = ROWS[row]
+    names = "position motion motion_static motion_ratio velocity droop penetration".split()
+    print(f"{steps} steps each, seed {scene.seed}, {len(files)} held-out rollouts\n")
+    print("| variant | CPU s | " + " | ".join(names) + " | parting |")
+    print("| --- |" + " ---: |" * (len(names) + 2))
+    for i, row in enumerate(rows):
+        options, spec, locks = ROWS[row]
         options, own = replace(options, steps=steps), replace(scene, spec=spec or scene.spec)
         held_scene = replace(own, held_out=True)
         held = RolloutBank(held_scene, coder.codes_of)
@@ -64,17 +81,36 @@ def run(scene: TrainingScene, work: Path, rows: list[str], steps: int) -> None:
         if spec is not None:
             maker = RolloutMaker(held_scene)
             held.rollouts = [maker.reread(int(path.stem), r, spec) for path, r in zip(files, held.rollouts)]
-        start = time.monotonic()
+        start = time.process_time()
         method = MomentMethod(own, coder.codes_of, options, None, lambda done, message: None)
+        for inputs in () if locks else (*method.inputs, *held.inputs):
+            inputs[:, LOCK_CODES] = 0
         torch.manual_seed(options.seed)
         net = StrandNet(own.spec.size, motion=options.motion, strand_map=options.strand_map)
         history = own.spec.slices["history"]
         net.set_normalisation(*map(torch.from_numpy, method.samples()), history, static=options.static)
         for _ in method.train(net, options.optimisers(net)):
             pass
+        seconds = time.process_time() - start
         card = measure(net, held, options.output, history, options.supported).to_json()
+        if i == 0:
+            print(f"| hair carried rigidly | 0 | {card['rigid']:.3g} | 1 | 1 | 0 | 1 | 0 | - | 0 |")
         cells = " | ".join(f"{card[name]:.3g}" for name in names)
-        print(f"| {row} | {time.monotonic() - start:.0f} | {cells} |", flush=True)
+        print(f"| {row} | {seconds:.0f} | {cells} | {parting(net, scene.grooms, held, options):.3g} |", flush=True)
+
+
+def parting(net: StrandNet, grooms: tuple[StrandSet, ...], held: RolloutBank, options: SelfSupervisedOptions) -> float:
+    """How far the hairs of a lock part: rms of their displacement about the lock's mean, relative to the solver's."""
+    own = true = 0.0
+    for rollout in held.rollouts:
+        lock = grooms[rollout.groom].lock[rollout.strands]
+        target = rollout.moved.astype(np.float32) * rollout.step
+        answer = predicted(net, held, rollout, options.output, options.anchored)
+        for each in np.unique(lock):
+            apart = [moved[rollout.first :, lock == each] for moved in (answer, target)]
+            apart = [np.square(part - part.mean(axis=1, keepdims=True)).sum(dtype=float) for part in apart]
+            own, true = own + apart[0], true + apart[1]
+    return float(np.sqrt(own / max(true, 1e-20)))
 
 
 def main() -> None:

@@ -95,13 +95,23 @@ def test_what_is_named_exists(document):
     assert not missing
 
 
+def anchor(heading: str) -> str:
+    """As GitHub turns headings into anchors: lower case, spaces as hyphens, without other signs."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_headings_that_are_linked_are_there(document):
-    """As GitHub turns them into anchors: lower case, spaces as hyphens, without other signs."""
-    for file, anchor in re.findall(r"\]\(([^)#:\s]*)#([^)\s]+)\)", (ROOT / document).read_text("utf-8")):
+    for file, linked in re.findall(r"\]\(([^)#:\s]*)#([^)\s]+)\)", (ROOT / document).read_text("utf-8")):
         there = ((ROOT / document).parent / file if file else ROOT / document).read_text("utf-8")
         headings = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", there, flags=re.M | re.S), re.M)
-        assert anchor in {re.sub(r"[^\w\- ]", "", each.lower()).replace(" ", "-") for each in headings}, (file, anchor)
+        assert linked in set(map(anchor, headings)), (file, linked)
+
+
+def test_the_index_of_the_ablations_names_each_section():
+    index, *sections = re.split(r"^##+ ", (ROOT / "docs/ablations.md").read_text("utf-8"), flags=re.M)
+    headings = [each.splitlines()[0] for each in sections]
+    assert len(headings) > 30 and not [each for each in headings if f"(#{anchor(each)})" not in index]
 
 
 @cache

@@ -126,7 +126,7 @@ def _stiffness(materials, hair: list[Hair], options: SelfSupervisedOptions, dyna
         bend=column([m.bend for m in materials]),
         weight=column([m.weight for m in materials]),
         damping=column(drag),
-        clumping=column([m.clumping for m in materials]),
+        clumping=column([options.adhesion * m.clumping for m in materials]),
         style=column([options.style[min(h.groom, len(options.style) - 1)] for h in hair]),
         inertia=dynamics,
     )

@@ -32,6 +32,7 @@ class SelfSupervisedOptions:
         supported: the groom carries its own weight in the bind pose, and the network's answer there is subtracted.
         random_materials: draw the four material constants for each moment; else the default ones.
         damping: damping of the default material [1/s] if materials are not random; the paper has none.
+        adhesion: factor on the stiffness of the ties between neighbours; 0 leaves them out.
         paper_adhesion: adhesion to the nearest vertices, without rest offset.
         style: stiffness of the hair style potential per groom [1/s^2]; the last value holds for all further grooms.
         volume: stiffness of self-collision [m^2/s^2]; measured on a quarter of the poses, which is enough.
@@ -55,6 +56,7 @@ class SelfSupervisedOptions:
     supported: bool = True
     random_materials: bool = True
     damping: float = 10.0
+    adhesion: float = 1.0
     paper_adhesion: bool = False
     style: tuple[float, ...] = (0.0,)
     volume: float = 0.3

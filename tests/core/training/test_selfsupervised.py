@@ -134,6 +134,8 @@ def test_each_choice_changes_what_is_minimised(pool, inputs):
     assert not torch.isclose(direct["bend_twist"], base["bend_twist"], rtol=1e-6)
     free = _losses(net, pool, inputs, replace(options, output="displacement"))
     assert free["stretch"] > 10 * base["stretch"]
+    tied = _losses(net, pool, inputs, replace(options, adhesion=3.0))
+    assert tied["adhesion"].item() == pytest.approx(3 * base["adhesion"].item(), rel=1e-5)
     heavy = _losses(net, pool, inputs, replace(options, random_materials=True), seed=1)
     assert not torch.isclose(heavy["gravity"], base["gravity"])
 
