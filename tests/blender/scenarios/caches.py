@@ -210,6 +210,7 @@ def blurred_alike(folder: Path) -> None:
         raise SkipTest("this Blender reads no velocities of hair")
     rig, scene, out = scenes.armature(), bpy.context.scene, str(folder / "hair.usdc")
     scenes.dance(rig)
+    scene.frame_end = 12
     strands = scenes.hair(rig, 20)
     make_live(rig, strands)
 

@@ -40,7 +40,7 @@ def several_scenes(folder: Path) -> None:
     """
     needs_usd()
     rig = scenes.armature()
-    bpy.context.scene.neuralocks.output = "//one.usdc"
+    bpy.context.scene.neuralocks.output, bpy.context.scene.frame_end = "//one.usdc", 12
     scenes.dance(rig)
     hair = scenes.hair(rig, 8)
     files, shown = {}, {}

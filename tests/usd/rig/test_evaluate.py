@@ -88,6 +88,7 @@ def test_depths_are_those_of_a_known_body(tmp_path, monkeypatch):
 
 def test_a_bake_keeps_hair_out_and_rests_and_the_command_says_so(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("usd.rig.evaluate.FRAMES", 4)
+    monkeypatch.setattr("usd.rig.evaluate.DEEPEST_FRAMES", 2)
     monkeypatch.setattr("usd.rig.evaluate.VERTICES", 1000)
     baked = bake_rig(EXAMPLE / "shot.usda", tmp_path / "baked.usdc", EXAMPLE / "quasi_static.neuralocks").path
     assert status("rig", "evaluate", baked, "--json") == 0
