@@ -157,12 +157,12 @@ def test_a_shot_that_ends_in_motion_is_felt_to_go_on():
 def test_a_volume_term_is_integrated_in_finer_steps(monkeypatch):
     """Its force lags behind within a step, so that steps as long as for hair without it leave an error that nothing shows."""
     rng, character = np.random.default_rng(0), person(HEAD.vertices + CENTRE, {})
-    roots = CENTRE + [0.11, 0, 0] + rng.uniform(-0.015, 0.015, (24, 1, 3)) * [1, 0, 1]
+    roots = CENTRE + [0.11, 0, 0] + rng.uniform(-0.015, 0.015, (16, 1, 3)) * [1, 0, 1]
     points = roots + np.linspace(0, -0.2, 24)[:, None] * [0, 1.0, 0]
-    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(24, 24))
+    groom = Groom("hair", points.reshape(-1, 3).astype(np.float32), np.full(16, 24))
     origin = rigs.POSITIONS[rigs.HEAD]
     strands = strand_set(groom, origin, CENTRE - origin, character.facing)
-    times, joints = pushed(25)
+    times, joints = pushed(13)
     joints[:, :, 0, 3] = joints[0, :, 0, 3] + 0.15 * np.sin(9 * times)[:, None]
     answers = {}
     for substeps in (1, comparison.CROWDED_STEPS, 8):

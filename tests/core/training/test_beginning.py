@@ -207,7 +207,7 @@ def test_what_was_trained_is_not_lost_to_a_wrong_word(tmp_path):
 def test_a_training_goes_on_where_the_model_was(few, in_one_process, tmp_path, monkeypatch):
     """Without a step it is as good as the model; killed, it does not need the model's file; its card tells both."""
     scene = TrainingScene(person(), (straight_hair(),), frames=40, strands=8)
-    first = RegressionOptions(steps=60, clips=16, strands=6, rate=4e-3)
+    first = RegressionOptions(steps=20, clips=8, strands=6, rate=2e-2)
     path = train_strands(scene, tmp_path / "a.neuralocks", first, rollouts=4, credits=("Hair: Rapunzel.",))
     still = RegressionOptions(steps=1, clips=2, strands=2, rate=0.0)
     begun = train_strands(scene, tmp_path / "b.neuralocks", still, rollouts=4, begin=path, credits=("Motion: none.",))
@@ -217,7 +217,7 @@ def test_a_training_goes_on_where_the_model_was(few, in_one_process, tmp_path, m
     assert set(before["report"]) == {"held out"}
     assert after["report"]["held out, begun with"] == after["report"]["held out"]
     assert after["credits"] == ["Hair: Rapunzel.", "Motion: none."]
-    assert after["training"]["began with"]["steps"] == 60
+    assert after["training"]["began with"]["steps"] == 20
 
     def kill(done, total, message):
         if "first simulations" in message:

@@ -208,9 +208,9 @@ def test_the_autoencoder_learns_strands_and_is_reproducible():
     curl = rng.uniform(0, 6, (400, 1, 1)) * along
     length = rng.uniform(0.05, 0.3, (400, 1, 1))
     shapes = length * np.concatenate([along + 0 * length, 0.2 * np.sin(curl), 0.2 * along * np.cos(curl)], -1)
-    first = train_autoencoder(shapes[:300], steps=400, batch=128)
-    short, again = (train_autoencoder(shapes[:300], steps=40, batch=128) for _ in range(2))
-    paper = train_autoencoder(shapes[:300], steps=400, batch=128, rate=1e-3, principal=False)
+    first = train_autoencoder(shapes[:300], steps=100, batch=128)
+    short, again = (train_autoencoder(shapes[:300], steps=20, batch=128) for _ in range(2))
+    paper = train_autoencoder(shapes[:300], steps=200, batch=128, rate=1e-3, principal=False)
     assert first.errors(shapes[300:]).mean() < 0.001
     assert paper.errors(shapes[300:]).mean() < 0.01
     np.testing.assert_array_equal(short.codes(shapes), again.codes(shapes))
