@@ -16,6 +16,9 @@ INSTALL = $(BIN)/python $(PIP_INSTALL)
 # One thread a process: the tests run in two processes, and small matrices only get slower with more. Some images tell
 # Python not to keep what it compiles: then each of the hundreds of processes that tests start compiles all it imports.
 TESTING = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
+# A process takes a file at a time. In their own order, the file of all Blenders' scenarios comes early and small ones
+# last; by the number of tests, the last would be those of few long tests, and one process would wait for the other.
+PYTEST = -m pytest -n 2 --dist loadfile --no-loadscope-reorder -q
 
 .PHONY: demo test lint tests lowest blender matrix addon native bench clean
 
@@ -29,7 +32,7 @@ lint: $(VENV)/installed-test
 	$(BIN)/ruff format --check -q .
 
 tests: $(VENV)/installed-test blender
-	$(TESTING) $(BIN)/python -m pytest -n 2 --dist loadfile -q
+	$(TESTING) $(BIN)/python $(PYTEST)
 
 # "name>=1.2,<2" is "name==1.2" at the least. Old packages warn of newer ones below them, and tidy up
 # less well.
@@ -38,7 +41,7 @@ FLOORS = $(shell $(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproj
 lowest: $(VENV)/installed-test
 	$(PYTHON) -m venv .venv-lowest
 	.venv-lowest/bin/python $(PIP_INSTALL) $(FLOORS) -e ".[test]" onnx
-	$(TESTING) .venv-lowest/bin/python -m pytest -n 2 --dist loadfile -q -W ignore::DeprecationWarning \
+	$(TESTING) .venv-lowest/bin/python $(PYTEST) -W ignore::DeprecationWarning \
 	    -W ignore::pytest.PytestUnraisableExceptionWarning \
 	    --ignore tests/core/physics --ignore tests/core/training --ignore tests/blender
 
@@ -84,7 +87,7 @@ PYTHON_3_13 = $(call find-python,3.13)
 blender: .venv-blender-4.2/installed .venv-blender-5.2/installed
 
 matrix: $(VENV)/installed-test blender .venv-blender-4.5/installed .venv-blender-5.0/installed
-	NEURALOCKS_BLENDERS=all $(TESTING) $(BIN)/python -m pytest -n 2 --dist loadfile -q \
+	NEURALOCKS_BLENDERS=all $(TESTING) $(BIN)/python $(PYTEST) \
 	    tests/blender tests/usd/test_in_blender.py tests/usd/rig/test_in_blender.py
 
 .venv-blender-4.2/installed:

@@ -33,7 +33,7 @@ def in_one_process(monkeypatch):
 
 
 class _Farm:
-    """Stands in for a farm: whenever its files are looked for, one more is there."""
+    """Stands in for a slow farm: whenever files are looked for of which some are not there yet, one more is."""
 
     alive = True
 
@@ -49,18 +49,17 @@ class _Farm:
         pass
 
     def files(self, first=None):
-        for index, path in enumerate(self._paths):
-            if not path.exists():
-                self._make(index, path)
-                break
-        return [path for path in self._paths[:first] if path.exists()]
+        asked = self._paths[:first]
+        if missing := [path for path in asked if not path.exists()]:
+            self._make(missing[0])
+        return [path for path in asked if path.exists()]
 
     def failed(self):
         return False
 
-    def _make(self, index: int, path: Path) -> None:
+    def _make(self, path: Path) -> None:
         from neuralocks_core.training.farm import save
         from neuralocks_core.training.rollouts import RolloutMaker
 
         self._maker = self._maker or RolloutMaker(self._scene)
-        save(path, self._maker.make(index))
+        save(path, self._maker.make(int(path.stem)))
