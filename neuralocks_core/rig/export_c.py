@@ -8,18 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.network import RigModel, rig_spec
+from neuralocks_core.rig.network import POSE, RigModel, rig_spec
 from neuralocks_core.rotation import rotation_part, to_quaternion
 
 _TEXTS = Path(__file__).parent
-_AT_ONCE = 4
-"""Rows of a layer that are summed at a time."""
+_AT_ONCE = 8
+"""Rows of a layer that are summed at a time: with more, SSE has no registers left for the inputs that they are multiplied with."""
 _WIDTH = 8
 """Columns of a layer are a multiple of this, the width of vector units."""
-HISTORY_BYTES = 11_328
+_ENTRIES = 128
+"""Of the history in history.h.in, a power of two."""
+HISTORY_BYTES = 5_768
 """Size of the struct of history.h.in; a dynamic model needs one per character."""
 MADE = "Made by `neuralocks rig export-c`"
 """Text in the first lines of both files."""
@@ -60,7 +63,8 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
         raise NeuralocksError(f"--prefix {prefix}: is not a C name; use letters, digits and _")
     known = rig_spec(model.dynamic)
-    if any(getattr(model.spec, name) != getattr(known, name) for name in ("pose_joints", "linear", "chest")):
+    read_alike = all(getattr(model.spec, name) == getattr(known, name) for name in ("pose_joints", "linear", "chest"))
+    if not read_alike or model.limits[: POSE - 3].min() < 1.01:  # the header does not clamp entries of rotations
         raise NeuralocksError("model: it reads other inputs than a header computes; train it with neuralocks rig train")
     for target, text in (
         (path, header_text(model, prefix)),
@@ -85,7 +89,6 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
     chains = model.chains
     size = np.float32(np.sin(model.max_angle / 2))
     layers = _padded(model.layers, len(chains))
-    spec = model.spec
     values = {
         "PREFIX": prefix,
         "UPPER": prefix.upper(),
@@ -99,21 +102,41 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
         "READS": _reads(model),
         "FACING": _facing(model),
         "DEGREES": f"{np.degrees(model.max_angle):.0f}",
-        "ROWS": len(layers[0][0]),
         "WIDTH": layers[-1][0].shape[1] // 3,
         "LIMITS": ", ".join(_float(v) for v in model.limits),
         "SIZE": _float(size),
         "SIZE2": _float(size * size),
         "FLOOR": _float(np.float32(1) - size * size),
-        "BINS": len(spec.bins),
-        "STEPS": spec.steps,
-        "BINSTEPS": ", ".join(str(b) for b in spec.bins),
-        "TAPER": ", ".join(_float(v) for v in spec.bin_weights),
-        "RATES": ", ".join(_float(1 / (spec.dt * b)) for b in spec.bins),
-        "DT": repr(float(spec.dt)),
-        **_network(layers),
+        **_history(model.spec),
+        **_network(layers, prefix),
     }
     return re.sub(r"@([A-Z0-9]+)@", lambda match: str(values[match[1]]), text)
+
+
+def _history(spec: BoundarySpec) -> dict[str, str]:
+    """What history.h.in says of the bins. Its times and integrals are 32-bit integers: as fine as these allow, if what is read of an
+    integral must not reach round the whole range (16 is more than any of them grows in a second), and no turn either.
+    """
+    longest = (spec.steps + 2) * spec.dt
+    unit = 2.0 ** np.floor(np.log2(2**31 / max(16 * longest, 32)))
+    ends, half = np.round(unit * spec.dt * np.cumsum((0, *spec.bins))).astype(int), int(unit * spec.dt / 2)
+    # Ends of the bins before the newest push: of gravity, of the turn and of velocity, which are read half a step apart.
+    lags = np.concatenate([[0], ends[1:] - half, ends, ends + half])
+    lags = np.pad(lags, (0, -len(lags) % 4), mode="edge")
+    return {
+        "BINS": str(len(spec.bins)),
+        "ENTRIES": str(_ENTRIES),
+        "STEPS": str(spec.steps),
+        "UNIT": _float(unit),
+        "APART": str(int(unit * (spec.steps + 1) * spec.dt / (_ENTRIES - 2))),
+        "LONGEST": _float(longest),
+        "LOOKUPS": str(len(lags)),
+        "LAGS": ", ".join(str(lag) for lag in lags),
+        "TAPER": ", ".join(_float(v) for v in spec.bin_weights),
+        "RATES": ", ".join(_float(1 / (unit * spec.dt * b)) for b in spec.bins),
+        "DT": _float(spec.dt),
+        "HALF": _float(spec.dt * unit / 2),
+    }
 
 
 def _binds(chains: HairChains) -> np.ndarray:
@@ -133,27 +156,26 @@ def _digest(model: RigModel) -> str:
     return digest.hexdigest()[:12].upper()
 
 
-def _network(layers: list[tuple[np.ndarray, np.ndarray]]) -> dict[str, str]:
+def _network(layers: list[tuple[np.ndarray, np.ndarray]], prefix: str) -> dict[str, str]:
     """C text of the padded layers: weights, buffers of their outputs, loops, and the last buffer's name."""
     tables, buffers, code, below = [], [], [], "x"
     for index, (weight, bias) in enumerate(layers):
         rows, columns = weight.shape
-        kind, number = ("double", _double) if index == 0 else ("float", _float)
-        table = ",\n".join(" {" + ", ".join(number(v) for v in row) + "}" for row in weight)
-        tables.append(f"  static const {kind} w{index}[{rows}][{columns}] = {{\n{table}}};")
-        tables.append(f"  static const {kind} b{index}[{columns}] = {{{', '.join(number(v) for v in bias)}}};")
+        table = ",\n".join(" {" + ", ".join(_float(v) for v in row) + "}" for row in weight)
+        tables.append(f"  static const float w{index}[{rows}][{columns}] = {{\n{table}}};")
+        tables.append(f"  static const float b{index}[{columns}] = {{{', '.join(_float(v) for v in bias)}}};")
         buffers.append(f"  float h{index}[{columns}];")
-        code.append(_layer(index, rows, columns, below, index + 1 < len(layers)))
+        code += _layer(index, rows, columns, below, f"{prefix}_positive" if index + 1 < len(layers) else "")
         below = f"h{index}"
     return {"TABLES": "\n".join(tables), "BUFFERS": "\n".join(buffers), "LAYERS": "\n".join(code), "RAW": below}
 
 
 def _padded(layers, joints: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Weights (in, out) and biases of the C layers, zeros added so that no loop has a remainder.
+    """Weights (in, out) and biases of the C layers, columns of zeros added so that no loop has a remainder.
 
     The last layer gives x of all joints, then y, then z, so that many joints are turned at once.
     """
-    result, rows = [], _round_up(layers[0][0].shape[1], _AT_ONCE)
+    result = []
     for index, (weight, bias) in enumerate(layers):
         count = len(bias)
         if index + 1 < len(layers):
@@ -161,11 +183,10 @@ def _padded(layers, joints: int) -> list[tuple[np.ndarray, np.ndarray]]:
         else:
             width = _round_up(joints, _WIDTH)
             place, columns = (np.arange(joints)[:, None] + width * np.arange(3)).ravel(), 3 * width
-        padded, biases = np.zeros((rows, columns), np.float32), np.zeros(columns, np.float32)
-        padded[: weight.shape[1], place] = weight.T
+        padded, biases = np.zeros((weight.shape[1], columns), np.float32), np.zeros(columns, np.float32)
+        padded[:, place] = weight.T
         biases[place] = bias
         result.append((padded, biases))
-        rows = columns
     return result
 
 
@@ -173,30 +194,31 @@ def _round_up(count: int, unit: int) -> int:
     return -(-count // unit) * unit
 
 
-def _layer(index: int, rows: int, columns: int, below: str, hidden: bool) -> str:
-    """Outer products whose inner loop has a constant length, so that it vectorises. Blocks of columns keep the sums in
-    registers, and four rows at a time save three of four memory accesses. Rows are added in the order of matrix libraries,
-    bias last, so that rounding is the same. The first layer is summed in double precision, as everywhere: it has many large
-    terms.
+def _layer(index: int, rows: int, columns: int, below: str, activation: str) -> list[str]:
+    """Lines of a layer: loops over columns, whose constant lengths vectorise, each for a block of rows.
+
+    Products are added in pairs, and blocks from the last row to the first, so that single precision suffices: the first layer has
+    over a hundred terms, and its largest, those of the pose, come last.
     """
-    block = next(size for size in (48, 40, 32, 24, 16, 8) if columns % size == 0)
-    total, kind, zero, narrow = "s[k]", "float", "0.0f", ""
-    if index == 0:
-        kind, zero, narrow = "double", "0.0", "(float)"
-    for row in range(_AT_ONCE):
-        total = f"({total} + w{index}[i + {row}][j + k] * {below}[i + {row}])"
-    lines = [
-        f"  for (j = 0; j < {columns}; j += {block}) {{",
-        f"    {kind} s[{block}];",
-        f"    for (k = 0; k < {block}; ++k) s[k] = {zero};",
-        f"    for (i = 0; i < {rows}; i += {_AT_ONCE})",
-        f"      for (k = 0; k < {block}; ++k) s[k] = {total[1:-1]};",
-        f"    for (k = 0; k < {block}; ++k) s[k] += b{index}[j + k];",
-        f"    for (k = 0; k < {block}; ++k) h{index}[j + k] = "
-        + (f"s[k] > {zero} ? {narrow}s[k] : 0.0f;" if hidden else f"{narrow}s[k];"),
-        "  }",
-    ]
-    return "\n".join(lines)
+    *others, first = (range(at, min(at + _AT_ONCE, rows)) for at in reversed(range(0, rows, _AT_ONCE)))
+    loop, value, total = f"  for (k = 0; k < {columns}; ++k)", f"h{index}[k]", f"b{index}[k]"
+    lines = []
+    if others:
+        lines.append(f"{loop} {value} = {total} + {_products(index, below, others[0])};")
+        total = value
+    if others[1:]:
+        lines.append(f"  for (i = {others[1][0]}; i > 0; i -= {_AT_ONCE})")
+        lines.append(f"  {loop} {value} += {_products(index, below, range(_AT_ONCE), 'i + ')};")
+    total += f" + {_products(index, below, first)}"
+    return [*lines, f"{loop} {value} = {activation}({total});" if activation else f"{loop} {value} = {total};"]
+
+
+def _products(index: int, below: str, rows: range, start: str = "") -> str:
+    """The sum of some rows of column k, each with its input, added in pairs of pairs."""
+    if len(rows) == 1:
+        return f"w{index}[{start}{rows[0]}][k] * {below}[{start}{rows[0]}]"
+    half = (len(rows) + 1) // 2
+    return f"({_products(index, below, rows[:half], start)} + {_products(index, below, rows[half:], start)})"
 
 
 def _parts_for(model: RigModel, text: str) -> str:
@@ -250,10 +272,6 @@ def _plain(text: str) -> str:
 def _float(value) -> str:
     text = str(np.float32(value))
     return (text if "." in text or "e" in text else f"{text}.0") + "f"
-
-
-def _double(value) -> str:
-    return repr(float(np.float32(value)))
 
 
 def _c_text(name: str) -> str:

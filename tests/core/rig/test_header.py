@@ -45,6 +45,20 @@ int main(void) {
 """
 
 
+EVALUATE_HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  static nl_hair_input in;
+  static nl_hair_output out;
+  while (fread(&in, sizeof in, 1, stdin) == 1) {
+    nl_hair_evaluate(&in, &out);
+    fwrite(&out, sizeof out, 1, stdout);
+  }
+  return 0;
+}
+"""
+
+
 @pytest.mark.parametrize(
     ("kind", "compiler"),
     [("static", COMPILERS[0]), ("odd", COMPILERS[0]), *(("shipped", c) for c in COMPILERS)],
@@ -135,6 +149,34 @@ def test_anything_gives_a_bounded_unit_quaternion(tmp_path):
     raw = np.full((1, 27 - 12), 3.4e38, np.float32)
     inputs = run_c(compiled(tmp_path, INPUT_HARNESS), raw, 15)
     assert np.isfinite(run_c(compiled(tmp_path, HARNESS), inputs, 64)).all()
+
+
+@pytest.mark.parametrize("dynamic", [False, True])
+def test_all_in_one_is_the_network_on_the_features(tmp_path, dynamic):
+    """Also of inputs that are too large, infinite and NaN, of which the features are within the model's limits."""
+    model = random_model(spec=rig_spec(dynamic))
+    export_c(model, tmp_path / "hair.h")
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(1000, model.inputs)).astype(np.float32)
+    wild = rng.random(rows.shape) < 0.1
+    wild[:500] = False
+    rows[wild] = rng.choice([1e10, -3e38, np.inf, -np.inf, np.nan], wild.sum())
+    together = run_c(compiled(tmp_path, EVALUATE_HARNESS), rows, 64).reshape(1000, 16, 4)
+    features = run_c(compiled(tmp_path, INPUT_HARNESS), rows, model.inputs)
+    assert (np.abs(features) <= model.limits).all()
+    assert np.abs(together - model.evaluate(features)).max() < 1e-6
+
+
+def test_limits_that_the_header_does_not_keep_are_refused(tmp_path):
+    """It leaves the entries of rotations as they are, which are at most 1."""
+    model = random_model()
+    with pytest.raises(NeuralocksError, match="other inputs than a header computes"):
+        export_c(replace(model, limits=0.5 * model.limits), tmp_path / "hair.h")
+
+
+def test_the_header_needs_no_library(tmp_path):
+    export_c(random_model(spec=rig_spec(True)), tmp_path / "hair.h")
+    assert "#include" not in (tmp_path / "hair.h").read_text()
 
 
 def test_features_from_quaternions(tmp_path):
