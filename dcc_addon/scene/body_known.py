@@ -39,13 +39,18 @@ def numbers_of_bodies(armature, scene) -> tuple[int | None, int | None]:
 
 def updated(updates) -> None:
     """Look again at what an update of Blender's may have changed; `updates` are those of a depsgraph."""
-    own, others = [update.id.original for update in updates], any(map(_regroups, updates))
-    meshes = {thing if isinstance(thing, bpy.types.Mesh) else thing.user for thing in own if isinstance(thing, SHAPED)}
-    # One that is known and takes only the shape of another pose, by drivers, is known still.
-    edited = {mesh for mesh in meshes if others or mesh.name_full not in session.surfaces or not follows(mesh, own)}
+    if not (session.bodies or session.surfaces):
+        return
+    ids, others = [update.id for update in updates], any(map(_regroups, updates))
+    shaped = [thing.original for thing in ids if isinstance(thing, SHAPED)]
+    meshes = {thing if isinstance(thing, bpy.types.Mesh) else thing.user for thing in shaped}
+    known = set() if others else {mesh for mesh in meshes if mesh.name_full in session.surfaces}
+    own = [thing.original for thing in ids] if known else []
+    # One that takes only the shape of another pose, by drivers, is known still.
+    edited = {mesh for mesh in meshes if mesh not in known or not follows(mesh, own)}
     if others or edited:
         session.bodies.clear()
-    replayed = _replayed({thing for thing in own if isinstance(thing, bpy.types.Action)})
+    replayed = _replayed({thing.original for thing in ids if isinstance(thing, bpy.types.Action)}) if others else set()
     for name in replayed.union(mesh.name_full for mesh in edited):
         session.surfaces.pop(name, None)
 
