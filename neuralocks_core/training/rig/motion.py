@@ -178,7 +178,7 @@ def _network_cost(model: RigModel) -> dict:
     return {
         "multiply_adds": int(work),
         "history_multiply_adds": HISTORY + BIN * (len(model.spec.bins) + 1) if model.dynamic else 0,
-        "square_roots": 2 * len(model.chains) + 6 * model.dynamic,
+        "square_roots": 2 * len(model.chains) + model.dynamic,
         "bytes_carried_on": HISTORY_BYTES if model.dynamic else 0,
     }
 
