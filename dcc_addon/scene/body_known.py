@@ -26,8 +26,10 @@ def numbers_of_bodies(armature, scene) -> tuple[int | None, int | None]:
     of its shape keys, and one that changes when drivers of these do. Names count for nothing. None if the scene has no mesh on the
     armature at all, as where hair alone was appended: nobody changed a body then.
     """
-    chosen = armature.neuralocks_character.body
-    key = identity(armature), identity(scene), chosen and identity(chosen), len(scene.objects)
+    chosen, data = armature.neuralocks_character.body, [keys.animation_data for keys in bpy.data.shape_keys]
+    # Blender does not tell of objects of a scene that is not in view, nor do older ones of a driver that is removed.
+    counts = len(scene.objects), sum(len(each.drivers) for each in data if each is not None)
+    key = identity(armature), identity(scene), chosen and identity(chosen), counts
     if key not in session.bodies:
         bodies = bodies_of(armature, scene)
         shapes, driven = sorted(map(_number_of, bodies)), [number_of_drivers(body.data) for body in bodies]
