@@ -114,6 +114,7 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(
     scene, few, in_one_process, tmp_path, monkeypatch
 ):
     """With a budget in seconds, each step learns from what happens to be there."""
+    monkeypatch.setattr("neuralocks_core.training.methods.STEPS_EACH", 2)
     graphs = []
     for name, ready in (("early", 6), ("late", 0)):
         out = tmp_path / f"{name}.neuralocks"
@@ -122,7 +123,7 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(
         for index in range(ready):
             save(folder / f"{index:06d}.npz", RolloutMaker(scene).make(index))
         monkeypatch.setattr("neuralocks_core.training.train.discard", lambda work: None)
-        train_strands(scene, out, RegressionOptions(steps=30, clips=4, strands=4), rollouts=6)
+        train_strands(scene, out, RegressionOptions(steps=6, clips=4, strands=4), rollouts=6)
         graphs.append(model.read(out).graphs)
         assert model.read(out).meta["training"]["rollouts"] == 6
     assert graphs[0] == graphs[1]
