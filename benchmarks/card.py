@@ -53,11 +53,16 @@ TABLES = (
 OTHERS = Table(
     "The same grooms, by the model for all hair", "real grooms in the shipped shot, which other models move", "", AFTER
 )
+BESIDE = "Beside a static net"
+"""The table that stands beside the one by hairstyle: the same hair in the same clips."""
 SLIDERS = "Materials, by style"
 COLUMNS = {
+    "rigid: position": "position of rigid hair, %",
+    "static: position": "position of a static net, %",
     "position": "position, %",
     "tips": "tips, %",
     "motion, median": "motion error",
+    "static: motion, median": "motion error of a static net",
     "velocity": "velocity error",
     "motion ratio": "motion ratio",
 }
@@ -104,10 +109,11 @@ def report(text: str, name: str) -> dict:
 
 def measured(text: str, which: Table, names=None) -> dict[str, dict[str, float]]:
     """What the card holds of one table; all rows, or only those with one of these names. A dash is left out."""
-    columns = {**COLUMNS, "inside %": which.inside}
+    columns, beside = {**COLUMNS, "inside %": which.inside}, table(text, BESIDE)
+    found = {name: beside.get(name, {}) | row for name, row in table(text, which.heading).items()}
     return {
         name: {own: row[column] for column, own in columns.items() if row.get(column) is not None}
-        for name, row in table(text, which.heading).items()
+        for name, row in found.items()
         if names is None or name in names
     }
 

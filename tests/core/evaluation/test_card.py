@@ -44,6 +44,17 @@ def test_a_card_has_all_that_an_aim_is_set_for(card):
             assert all(row >= wanted for row in rows), each.name
 
 
+def test_each_hairstyle_stands_beside_rigid_hair_and_a_static_net(card):
+    rows = {}
+    for path in model.specialists():
+        rows |= model.read(path).meta["report"][card["TABLES"][0].name]
+    assert len(rows) == 12
+    for style, row in rows.items():
+        assert row["position, %"] < row["position of rigid hair, %"], style
+        assert row["position, %"] < row["position of a static net, %"], style
+        assert row["motion error"] < row["motion error of a static net"] <= 1, "rigid hair has 1"
+
+
 def test_the_model_for_all_hair_tells_what_it_does_to_hair_that_others_move(card):
     report = model.read(model.shipped()).meta["report"]
     assert set(report) == {card["OTHERS"].name, "falls short"} and "which other models move" in card["OTHERS"].name
@@ -86,6 +97,7 @@ def short(card):
         for each, (row, body) in zip(card["TABLES"], bodies.items(), strict=True):
             text += f"## {each.heading}\n{HEAD}| {row} | {body} |\n| coils | 9 | 9 | 9 | 9 | 9 | 9 |\n| **all** | 9 | 9 | 9 | 9 | 9 | 9 |\n\n"
         text += f"## {card['OTHERS'].heading}\n{HEAD}| hair_tail | {shot} |\n\n"
+        text += f"## {card['BESIDE']}\n| style | static: position |\n| --- | ---: |\n| bob | 9 |\n\n"
         text += f"## {card['SLIDERS']}\n| style | stiffness | weight | damping | clumping |\n{'| --- ' * 5}|\n| bob | {sliders} | no effect |\n"
         return card["report"](text, name)["falls short"]
 
