@@ -4,6 +4,7 @@
 import sys
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -66,6 +67,28 @@ def test_a_livelier_model_takes_acceleration_and_damping_for_so_many_times_and_n
     assert (
         model.read(livelier).meta["training"]["livelier"] == "acceleration of the head, times 1.5; damping, times 1.25"
     )
+
+
+def test_how_far_hairs_of_a_lock_part_leaves_out_where_the_lock_goes(monkeypatch):
+    pytest.importorskip("torch", reason="the extra 'train' is not installed")
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "benchmarks")
+    benchmark = import_module("selfsupervised")
+    random = np.random.default_rng(0)
+    solved = random.integers(-1000, 1000, (5, 4, 24, 3)).astype(np.int16)
+    groom = SimpleNamespace(lock=np.array([7, 3, 3, 7]))
+    held = SimpleNamespace(rollouts=[SimpleNamespace(groom=0, strands=np.arange(4), moved=solved, step=1e-3, first=2)])
+
+    def parts(answer):
+        monkeypatch.setattr(benchmark, "predicted", lambda *_: answer)
+        return benchmark.parting(None, (groom,), held, benchmark.OURS)
+
+    away = random.normal(size=(5, 1, 24, 3)) * np.array([1, 2, 2, 1])[:, None, None]  # the same within a lock
+    assert parts(solved * 1e-3 + away) == pytest.approx(1, abs=1e-5)
+    assert parts(solved * 4e-4 + away) == pytest.approx(0.4, abs=1e-5)
+    assert parts(np.broadcast_to(away, solved.shape)) == pytest.approx(0, abs=1e-5)
+    before = solved * 1e-3
+    before[:2] += random.normal(size=before[:2].shape)  # frames that nobody learns from
+    assert parts(before) == pytest.approx(1, abs=1e-5)
 
 
 def assert_close(one: dict, other: dict) -> None:
