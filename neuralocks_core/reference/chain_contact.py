@@ -4,30 +4,30 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from neuralocks_core.body.surface_samples import SurfaceSamples, nearest
 from neuralocks_core.rig.chains import HairChains
 
-CORNERS = 8
-"""Points of each joint's mesh that collide with the body. With only spheres at the ends and middles of the bones, the mesh was up
-to 24 mm deep in the body; with these points, up to 4 mm."""
+CORNERS, MORE, APART = 8, 32, 0.02
+"""Points of each joint's mesh that collide with the body: the corners, and up to MORE where one is farther than APART [m] from all
+others, as on large locks. With only spheres at the ends and middles of the bones, the mesh was up to 24 mm deep in the body."""
 BONE_RADIUS = 0.012
 """[m] kept from the body by the bones of hair without a mesh."""
 
 
 @dataclass(frozen=True)
-class BodyPoints:
-    """A thousand body vertices around the head of each clip and step, in the head's frame.
+class BodyMesh:
+    """The body around the head of each clip and step, in the head's frame.
 
     Attributes:
-        points, normals: (C, T, P, 3) float32 [m].
-        rest_points, rest_normals: of the bind pose, (P, 3).
+        samples: places on its faces.
+        vertices: (C, T, V, 3) float32 [m].
+        rest: vertices of the bind pose, (V, 3).
     """
 
-    points: np.ndarray
-    normals: np.ndarray
-    rest_points: np.ndarray
-    rest_normals: np.ndarray
+    samples: SurfaceSamples
+    vertices: np.ndarray
+    rest: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -66,32 +66,36 @@ class Contacts:
             mine = points[weights[:, 1 + joint] > 0.5]
             if not len(mine):
                 mine = chains.origins[joint] + chains.bones[chains.bone_joint == joint]
-            corners = _far_apart(mine, CORNERS)
+            corners = _far_apart(mine)
             joints += [joint] * len(corners)
             chosen += corners
         return cls(np.array(joints), np.array(chosen), np.full(len(joints), radius))
 
 
-class NearestVertices:
-    """The bodies of one step, points and normals (C, P, 3), for nearest-vertex queries."""
+class NearestFaces:
+    """The bodies of one step, vertices (C, V, 3) of a mesh with such samples."""
 
-    def __init__(self, points, normals):
-        self.points, self.normals = points, normals
-        self._trees = [cKDTree(p, balanced_tree=False, compact_nodes=False) for p in points]
+    def __init__(self, samples: SurfaceSamples, vertices: np.ndarray):
+        self.samples, self.vertices = samples, vertices
+        self._index = [samples.index(body) for body in vertices]
 
     def planes(self, where):
-        """Plane n.x = d of the body vertex nearest to each of `where` (C, Q, 3): normals n (C, Q, 3) and offsets d (C, Q)."""
-        nearest = np.stack([tree.query(points)[1] for tree, points in zip(self._trees, where)])
-        rows = np.arange(len(where))[:, None]
-        normals = self.normals[rows, nearest].astype(float)
-        return normals, np.einsum("cqi,cqi->cq", normals, self.points[rows, nearest])
+        """Plane n.x = d through the place of the body nearest to each of `where` (C, Q, 3), across the way there: normals n
+        (C, Q, 3) and offsets d (C, Q).
+        """
+        found = np.concatenate([nearest(index, points) for index, points in zip(self._index, where)])
+        clip = np.repeat(np.arange(len(where)), where.shape[1])
+        normals, offsets = self.samples.planes(found, where.reshape(-1, 3), self.vertices, clip)
+        return normals.reshape(where.shape), offsets.reshape(where.shape[:2])
 
 
-def _far_apart(points: np.ndarray, count: int) -> list[np.ndarray]:
-    """At most `count` of points (V, 3): each is the farthest from those before it, the first from their mean."""
+def _far_apart(points: np.ndarray) -> list[np.ndarray]:
+    """Some of points (V, 3): each is the farthest from those before it, the first from their mean."""
     chosen = []
     distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
-    for _ in range(min(count, len(points))):
+    for place in range(min(CORNERS + MORE, len(points))):
+        if place >= CORNERS and distance.max() < APART:
+            break
         chosen.append(points[distance.argmax()])
         distance = np.minimum(distance, np.linalg.norm(points - chosen[-1], axis=1))
     return chosen

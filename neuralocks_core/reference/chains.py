@@ -6,8 +6,8 @@ Second backward differences, as in `solver`, and Gauss-Newton on the joints' rot
     9 sum m / (8 h^2) |x - y|^2 + 3 sum m c / (4 h) |x - z|^2 + bend(D) - sum m (g + support) x + contact(x)
 
 with x the bones' far ends in the head's current frame, y where free flight would have taken them, and z where they would be if
-they had the head's velocity. The contacts are points of the hair's mesh, each fixed to one joint, against the plane of the
-nearest body vertex.
+they had the head's velocity. The contacts are points of the hair's mesh, each fixed to one joint, against the plane through the
+nearest place of the body.
 """
 
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from neuralocks_core.motion import GRAVITY
-from neuralocks_core.reference.chain_contact import BodyPoints, Contacts, NearestVertices
+from neuralocks_core.reference.chain_contact import BodyMesh, Contacts, NearestFaces
 from neuralocks_core.reference.head_motion import between, head_motion
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains
 from neuralocks_core.rig.rods import RodTree
 from neuralocks_core.rotation import from_quaternion, quaternion_product
 
-ITERATIONS = 2
-"""Gauss-Newton steps per time step."""
+ITERATIONS = 3
+"""Gauss-Newton steps per time step. With two, hair that flies into the body is still up to 2 mm deep in it."""
 
 
 class ChainSolver:
@@ -38,8 +38,9 @@ class ChainSolver:
         contacts: what collides with the body; ends and middles of the bones if left out.
     """
 
-    STIFFNESS = 4e4
-    """Contact stiffness per unit of the mass that a joint moves [1/s^2]: one g presses it in by 0.25 mm."""
+    STIFFNESS = 4e5
+    """Contact stiffness per unit of the mass that a joint moves [1/s^2]: one g presses it in by 0.025 mm, on one of eight contacts by
+    0.2 mm. With a tenth, a lock that is thrown against the neck lies 11 mm in it."""
 
     def __init__(
         self,
@@ -67,7 +68,7 @@ class ChainSolver:
         self,
         heads: np.ndarray,
         step: float,
-        body: BodyPoints | None = None,
+        body: BodyMesh | None = None,
         wind: np.ndarray | None = None,
         *,
         substeps: int = 2,
@@ -92,7 +93,7 @@ class ChainSolver:
         pull = GRAVITY * self.weight + (np.zeros((samples, 3)) if wind is None else wind)
         result = np.empty((clips, samples, len(self.chains), 4), np.float32)
         # by sample, then by clip
-        bodies = () if body is None else [np.swapaxes(a, 0, 1) for a in (body.points, body.normals)]
+        bodies = None if body is None else np.swapaxes(body.vertices, 0, 1)
         flown = None
         ways = [head_motion(head, substeps) for head in heads]
         facing = np.stack([Rotation.from_quat(way.turn).as_matrix() for way in ways])
@@ -109,7 +110,7 @@ class ChainSolver:
                 flight = np.einsum("cji,cmj->cmi", rotation, flown.free() - origin[:, None])
                 gravity = np.einsum("cji,j->ci", rotation, between(pull, at, substeps))
                 if body is not None and (sample > 0 or part == 0):
-                    near = NearestVertices(*(between(a, at, substeps) for a in bodies))
+                    near = NearestFaces(body.samples, between(bodies, at, substeps))
                 turns, ends = self._step(turns, flight, flown.carried(), gravity, h, near, limit)
                 flown = flown.then(np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None], ends)
             result[:, sample] = turns
@@ -151,12 +152,13 @@ class ChainSolver:
                 right = np.einsum("cab,ca->cb", jacobian, force[:, bones].reshape(len(turns), -1))
                 right += bend[:, joints].reshape(len(turns), -1)
                 if near is not None:
+                    contacts = contacts[(depth[:, contacts] > 0).any(axis=0)]
                     arm = touching[:, contacts, None] - positions[:, None, joints]
                     arm = arm * self.contact_moves[contacts][:, joints, None]
-                    away = np.cross(arm, planes[0][:, contacts, None]).reshape(len(turns), len(contacts), 3 * count)
-                    push = self.contact_stiffness[contacts] * (depth[:, contacts] > 0)
-                    hessian += np.swapaxes(away * push[..., None], 1, 2) @ away
-                    right += np.einsum("cqa,cq->ca", away, push * depth[:, contacts])
+                    away = _cross(arm, planes[0][:, contacts, None]).reshape(len(turns), len(contacts), 3 * count)
+                    push = (self.contact_stiffness[contacts] * (depth[:, contacts] > 0))[..., None]
+                    hessian += np.swapaxes(away * push, 1, 2) @ away
+                    right += (np.swapaxes(away, 1, 2) @ (push * depth[:, contacts, None]))[..., 0]
                 solved = np.linalg.solve(hessian, right[..., None])[..., 0].reshape(len(turns), count, 3)
                 change[:, joints] = solved
             size = np.linalg.norm(change, axis=-1, keepdims=True)
@@ -170,9 +172,7 @@ class ChainSolver:
         """Distance that each contact keeps: its radius, or its distance at rest if that is less."""
         if body is None:
             return None
-        normals, offsets = NearestVertices(body.rest_points[None], body.rest_normals[None]).planes(
-            self.contacts.points[None]
-        )
+        normals, offsets = NearestFaces(body.samples, body.rest[None]).planes(self.contacts.points[None])
         return np.minimum(self.contacts.radius, np.einsum("qi,qi->q", normals[0], self.contacts.points) - offsets[0])
 
     def _touching(self, rotations, positions):
@@ -212,6 +212,12 @@ class _Flown:
         """A step later."""
         speed = (3 * world - 4 * self.last + self.before) / 2
         return _Flown(world, self.last, held, self.held, speed, self.speed)
+
+
+def _cross(a, b):
+    """`numpy.cross` of (..., 3), in a third of its time."""
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def _small(vector):

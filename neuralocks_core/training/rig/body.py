@@ -6,18 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.body.enclosed import proven_distances
-from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.body.surface_samples import SurfaceSamples, nearest
+from neuralocks_core.reference.chain_contact import BodyMesh
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.skinned_body import Body
-from neuralocks_core.training.rig.surface_samples import SurfaceSamples, nearest
 
 KEPT = 2000
 """Number of places of each posed body that say which of its faces is nearest."""
-AROUND = 1000
-"""Number of body vertices that a simulation collides with."""
-BEYOND = 0.1
-"""They are no farther from the head than this beyond the ends of bones at rest [m]. `HairRig.in_reach` is wider, because it leaves out
-nothing that hair may touch: of so few vertices, more would be far from the hair."""
 
 
 class BodyPatch:
@@ -44,6 +39,14 @@ class BodyPatch:
         self.body = replace(near, shapes=shapes)
         self.samples = SurfaceSamples(near.points, near.triangles, count)
 
+    def met(self, rig: HairRig, joints: np.ndarray) -> BodyMesh:
+        """What a simulation meets, under world joint transforms (C, T, J, 4, 4)."""
+        posed = np.empty((*joints.shape[:2], *self.body.points.shape), np.float32)
+        for clip, poses in zip(posed, joints):
+            for row, skinning in zip(clip, rig.character.skinning(poses)):
+                row[:] = self.body.posed(skinning)
+        return BodyMesh(self.samples, posed, rig.character.canonical(self.body.points))
+
 
 def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Signed distances (T, V) [m] of points (T, V, 3), canonical, to the body under world joint transforms (T, J, 4, 4)."""
@@ -57,7 +60,7 @@ def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.
 def _in_reach(rig: HairRig) -> Body | None:
     """The part of the body that hair can reach; None if there is no such part."""
     body = rig.character.body
-    near = None if body is None or not len(rig.points) else body.only(body.triangles[rig.in_reach(body)])
+    near = None if body is None else body.only(body.triangles[rig.in_reach(body)])
     return None if near is None or not len(near.triangles) else near
 
 
@@ -68,12 +71,11 @@ def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
     In poses, distances are those. Where they are wrong, hair would be thrown from where the artist put it.
     """
     exact, patch = rest_distances(rig, points), BodyPatch.of(rig, KEPT)
-    if patch is None:
+    if patch is None or not len(points):
         return exact
     vertices, samples = rig.character.canonical(patch.body.points), patch.samples
     found = nearest(samples.index(vertices), points)
-    read = (values[None, samples.corners] for values in (vertices, samples.normals(vertices)))
-    normals, offsets = samples.planes(found, points, *read)
+    normals, offsets = samples.planes(found, points, vertices[None])
     return np.minimum(exact, np.einsum("vi,vi->v", points, normals) - offsets)
 
 
@@ -83,26 +85,3 @@ def rest_distances(rig: HairRig, points: np.ndarray) -> np.ndarray:
     if body is None:
         return np.full(len(points), np.inf)
     return proven_distances(rig.character.canonical(body.points), body.triangles, points)
-
-
-def body_around(rig: HairRig, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """At most AROUND body vertices around the head for world joint transforms (T, J, 4, 4): points and normals (T, P, 3) in
-    canonical space of the head; None if there are none.
-    """
-    body = rig.character.body
-    if body is None:
-        return None
-    canonical = rig.character.canonical(body.points)
-    reach = np.linalg.norm(rig.chains.origins, axis=1).max() + rig.chains.lengths.max() + BEYOND
-    used = np.isin(np.arange(len(canonical)), body.triangles) & (np.linalg.norm(canonical, axis=1) < reach)
-    near = np.flatnonzero(used)
-    if not len(near):
-        return None
-    chosen = np.sort(np.random.default_rng(0).permutation(near)[:AROUND])
-    normals = vertex_normals(body.points, body.triangles)[chosen]
-    points, turned = np.empty((2, len(joints), len(chosen), 3), np.float32)
-    for row, matrices in enumerate(rig.character.skinning(joints)):
-        blended = np.einsum("vi,vixy->vxy", body.joint_weights[chosen], matrices[body.joint_indices[chosen], :3])
-        points[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], body.points[chosen]) + blended[:, :, 3]
-        turned[row] = np.einsum("vxy,vy->vx", blended[:, :, :3], normals)
-    return points, turned / np.linalg.norm(turned, axis=-1, keepdims=True)

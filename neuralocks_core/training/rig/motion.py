@@ -11,7 +11,7 @@ from neuralocks_core.animation.gestures import KINDS
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress, silent
-from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
+from neuralocks_core.reference.chain_contact import Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.reference.spring_bones import SpringSettings, spring_bones
 from neuralocks_core.rig.export_c import HISTORY_BYTES
@@ -20,7 +20,7 @@ from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial, RodTree
 from neuralocks_core.rotation import from_quaternion
-from neuralocks_core.training.rig.body import body_around, posed_distances, rest_distances
+from neuralocks_core.training.rig.body import KEPT, BodyPatch, posed_distances, rest_distances
 from neuralocks_core.training.rig.report import depths, hair_points, no_turns
 from neuralocks_core.wind import Wind
 
@@ -34,19 +34,14 @@ SPRINGS, DEFAULTS = "spring bones, best of 12 settings", "spring bones, VRM's de
 def simulate_motions(rig: HairRig, material: RigMaterial, spec, motions, wind: Wind | None = None):
     """Features (C, T, F) and simulated turns (C, T, N, 4) of clips of equal length, sampled at RATE."""
     times = np.arange(int(round((motions[0].end - motions[0].start) * RATE)) + 1) / RATE + motions[0].start
-    heads, features, bodies = [], [], []
-    for motion in motions:
-        joints = motion.at(times)
-        heads.append(rig.character.canonical_to_world(joints))
-        features.append(RigSampler(spec, rig.character, motion).features(times, wind=wind))
-        bodies.append(body_around(rig, joints))
-    body = None
-    if bodies[0] is not None:
-        rest = body_around(rig, rig.character.skeleton.bind[None])
-        body = BodyPoints(np.stack([b[0] for b in bodies]), np.stack([b[1] for b in bodies]), rest[0][0], rest[1][0])
+    joints = np.stack([motion.at(times) for motion in motions])
+    heads = np.stack([rig.character.canonical_to_world(poses) for poses in joints])
+    features = [RigSampler(spec, rig.character, motion).features(times, wind=wind) for motion in motions]
+    patch = BodyPatch.of(rig, KEPT)
+    body = None if patch is None else patch.met(rig, joints)
     contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, material.margin) if len(rig.points) else None
     solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping, material.weight, contacts)
-    return np.stack(features), solver.simulate(np.stack(heads), 1 / RATE, body, wind and wind.at(times))
+    return np.stack(features), solver.simulate(heads, 1 / RATE, body, wind and wind.at(times))
 
 
 def motion_report(

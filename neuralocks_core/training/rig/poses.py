@@ -6,13 +6,13 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from neuralocks_core.body.enclosed import proven_distances
+from neuralocks_core.body.surface_samples import nearest
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import cores
 from neuralocks_core.training.rig.body import KEPT, BodyPatch
-from neuralocks_core.training.rig.surface_samples import nearest
 
 RANGE = np.radians([60.0, 80.0, 45.0])
 """Largest nod, turn and tilt of people's heads relative to the chest [rad]."""
@@ -46,11 +46,10 @@ class PosePool:
         self.rig, self.count, self._rng, self._oldest, self._moving = rig, count, rng, 0, moving
         self.moment = np.zeros(count, int)
         self.relative = np.empty((count, 2, 3, 3))
-        self._patch = BodyPatch.of(rig, KEPT)
+        self._patch = BodyPatch.of(rig, KEPT) if len(rig.points) else None
         self.shapes = np.zeros((count, len(self._patch.body.shapes) if self._patch else 0))
         if self._patch:
-            # Of a whole body of 90,000 vertices, 512 poses are a gigabyte.
-            self._corners, self._normals = np.empty((2, count, len(self._patch.samples.corners), 3), np.float32)
+            self.bodies = np.empty((count, len(self._patch.body.points), 3), np.float32)
             self._index = np.empty((count, 4, KEPT), np.float32)
             self._joints = np.unique(self._patch.body.joint_indices)
             self._skinning = np.empty((count, len(self._joints), 4, 4))
@@ -79,12 +78,9 @@ class PosePool:
             return rows
         self.shapes[rows] = np.clip(self._rng.normal(0, 0.35, (count, self.shapes.shape[1])), -0.8, 0.8)
         skinning = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)[:, None] @ skinning
-        self._skinning[rows] = skinning[:, self._joints]
-        samples = self._patch.samples
-        for row in rows:
-            body = self._posed(row)
-            self._corners[row], self._normals[row] = body[samples.corners], samples.normals(body)[samples.corners]
-            self._index[row] = samples.index(body)
+        for row, matrices in zip(rows, skinning):
+            self.bodies[row] = body = self._patch.body.posed(matrices, self.shapes[row])
+            self._index[row] = self._patch.samples.index(body)
         return rows
 
     def body(self, pose: int) -> np.ndarray:
@@ -113,7 +109,7 @@ class PosePool:
         """
         found = np.concatenate([nearest(self._index[pose], some) for pose, some in zip(poses, points)])
         normals, offsets = self._patch.samples.planes(
-            found, points.reshape(-1, 3), self._corners, self._normals, np.repeat(poses, points.shape[1])
+            found, points.reshape(-1, 3), self.bodies, np.repeat(poses, points.shape[1])
         )
         return normals.reshape(points.shape), offsets.reshape(points.shape[:2])
 

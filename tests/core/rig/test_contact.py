@@ -10,7 +10,7 @@ import trimesh
 
 torch = pytest.importorskip("torch")
 
-from neuralocks_core.reference.chain_contact import BodyPoints, Contacts
+from neuralocks_core.reference.chain_contact import BodyMesh, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.rig import find_chains, rig_spec
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains, skin
@@ -52,11 +52,10 @@ def test_ribbons_that_fall_over_the_head_lie_on_it():
     """Edges as well as middles; without a body they fall through."""
     rig = on_a_ball()
     body = rig.character.canonical(rig.character.body.points).astype(np.float32)
-    normals = ((body - CENTRE) / RADIUS).astype(np.float32)
     heads = np.tile(np.eye(4), (1, 60, 1, 1))
     bow = np.stack([from_vector(np.array([angle, 0, 0])) for angle in np.linspace(0, np.radians(110), 30)])
     heads[0, :, :3, :3] = np.concatenate([bow, bow[-1:].repeat(30, axis=0)])
-    balls = BodyPoints(body[None, None].repeat(60, 1), normals[None, None].repeat(60, 1), body, normals)
+    balls = BodyMesh(BodyPatch.of(rig, 500).samples, body[None, None].repeat(60, 1), body)
     material = RigMaterial(bend=1e-3, rest_support=False)
     contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, material.margin)
     solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping, contacts=contacts)

@@ -6,17 +6,16 @@ import pytest
 import trimesh
 
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.surface_samples import SurfaceSamples, nearest
 from neuralocks_core.mesh import welded_vertices
 from neuralocks_core.rotation import from_vector
-from neuralocks_core.training.rig.surface_samples import SurfaceSamples, nearest
 
 RADIUS = 0.12
 
 
 def distances(samples: SurfaceSamples, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
     found = nearest(samples.index(vertices), points)
-    read = (values[None, samples.corners] for values in (vertices, samples.normals(vertices)))
-    normals, offsets = samples.planes(found, points, *read)
+    normals, offsets = samples.planes(found, points, vertices[None])
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
     return (points * normals).sum(axis=1) - offsets
 
