@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from neuralocks_core.body.holes import closed_holes
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import find_chains
@@ -75,6 +76,7 @@ def assemble_rig(
     body = character.body
     if body is not None:
         faces = np.concatenate(body_triangles) if body_triangles else np.zeros((0, 3), int)
+        faces = np.concatenate([faces, closed_holes(body.points, faces)])
         body = Body(body.points, faces, body.joint_indices, body.joint_weights, body.shapes) if len(faces) else None
     rig = HairRig(
         character,

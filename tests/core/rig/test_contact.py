@@ -10,6 +10,7 @@ import trimesh
 
 torch = pytest.importorskip("torch")
 
+from neuralocks_core.body.collider import Collider
 from neuralocks_core.reference.chain_contact import BodyMesh, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.rig import find_chains, rig_spec
@@ -22,7 +23,7 @@ from neuralocks_core.rotation import from_quaternion, from_vector
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig import deepest
 from neuralocks_core.training.rig import dynamic as rig_dynamic
-from neuralocks_core.training.rig.body import BodyPatch
+from neuralocks_core.training.rig.body import BodyPatch, rest_distances
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments
 from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.report import hair_points, no_turns
@@ -65,6 +66,50 @@ def test_ribbons_that_fall_over_the_head_lie_on_it():
         points = skin(rig.chains, *pose_chains(rig.chains, from_quaternion(turns)), rig.points, rig.weights)
         depths.append(RADIUS - np.linalg.norm(points - CENTRE, axis=-1).min())
     assert depths[0] > 0.02 and depths[1] < -0.0035, depths
+
+
+def bowed(rig: HairRig, head: trimesh.Trimesh, quick: float) -> tuple[float, float]:
+    """How deep hair is [m], at worst, in a head that bows in 1 / `quick` s: simulated without it and with it."""
+    body, frames = np.array(head.vertices) + CENTRE, 60
+    joints = np.full((len(body), 1), rig.character.head)
+    at = body + rig.character.skeleton.bind[rig.character.head, :3, 3]
+    rig = replace(rig, character=replace(rig.character, body=Body(at, head.faces, joints, np.ones_like(joints, float))))
+    angles = np.minimum(np.linspace(0, 2 * quick, frames), 1) * np.radians(110)
+    heads = np.tile(np.eye(4), (1, frames, 1, 1))
+    heads[0, :, :3, :3] = np.stack([from_vector(np.array([angle, 0, 0])) for angle in angles])
+    patch = BodyPatch.of(rig, 500)
+    met = patch.met(rig, rig.character.skeleton.bind[None, None].repeat(frames, axis=1))
+    material = RigMaterial(bend=1e-3, rest_support=False)
+    contacts = Contacts.of_mesh(rig.chains, rig.points, rig.weights, material.margin)
+    solver = ChainSolver(rig.chains, RodTree(rig.chains, material), material.damping, contacts=contacts)
+    exact, depths = Collider(body, head.faces), []
+    for hit in (None, met):
+        turns = solver.simulate(heads, 1 / 30, hit)[0].astype(float)
+        points = skin(rig.chains, *pose_chains(rig.chains, from_quaternion(turns)), rig.points, rig.weights)
+        depths.append(-float(exact.distance(points)[0].min()))
+    return tuple(depths)
+
+
+@pytest.mark.parametrize(
+    ("head", "quick"),
+    [(trimesh.creation.box((0.2, 0.24, 0.2)), 1.0), (trimesh.creation.icosphere(4, RADIUS), 12.0)],
+    ids=["a box of twelve faces", "thrown over a ball"],
+)
+def test_simulated_hair_stays_out_of_the_head(head, quick):
+    """Amid large faces, where the nearest vertex says nothing, and where contact has one step to stop it."""
+    free, kept = bowed(on_a_ball(), head, quick)
+    assert free > 0.02 and -0.009 < kept < 0.004, (free, kept)
+
+
+def test_a_large_lock_collides_with_more_points():
+    """So that no corner of a body fits between them."""
+    rig = on_a_ball()
+    bun = trimesh.creation.icosphere(3, 0.1).vertices
+    weights = np.tile(np.eye(1, len(rig.chains) + 1, 1), (len(bun), 1))
+    contacts = Contacts.of_mesh(rig.chains, bun, weights, 0.01)
+    mine = contacts.points[contacts.joint == 0]
+    gaps = np.linalg.norm(bun[:, None] - mine[None], axis=-1).min(axis=1)
+    assert len(mine) > 20 and gaps.max() < 0.045
 
 
 def test_contacts_are_the_corners_of_each_joint():
@@ -173,30 +218,44 @@ def test_twist_of_a_lock_is_seen_and_learned_from():
     assert (marks[1] - marks[0]).square().sum().item() == pytest.approx(expected, rel=1e-9)
 
 
+def assembled(rig: HairRig, body: Body, joint: int) -> HairRig:
+    """The rig of such a hair and a body on one joint, as files hold them: two meshes of one character."""
+    who = rig.character
+    joints = np.full((len(body.points), 1), joint)
+    ribbon = rig.points + who.skeleton.bind[who.head, :3, 3]
+    on = rig.chains.joints[rig.weights[:, 1:].argmax(axis=1)][:, None]
+    meshes = [
+        SkinnedMesh("body", body.points, body.triangles, joints, np.ones_like(joints, float)),
+        SkinnedMesh("hair", ribbon, np.arange(len(ribbon)).reshape(-1, 3), on, np.ones((len(ribbon), 1))),
+    ]
+    both = Body(
+        np.concatenate([body.points, ribbon]),
+        np.concatenate([body.triangles, meshes[1].triangles + len(body.points)]),
+        np.concatenate([joints, on]),
+        np.ones((len(body.points) + len(ribbon), 1)),
+    )
+    return assemble_rig(replace(who, body=both), meshes)
+
+
 @pytest.mark.parametrize("away", [0.0, 1.5])
 def test_a_body_out_of_the_hairs_reach_is_none(away):
     """With only shoes on the skeleton, nothing is near, and training continues without a body."""
     rig = on_a_ball()
-    who, body, feet = rig.character, rig.character.body, rig.character.skeleton.names.index("hips")
-    joint = who.head if not away else feet
-    joints = np.full((len(body.points), 1), joint)
-    body = replace(body, points=body.points - (0, away, 0), joint_indices=joints)
-    ribbon = rig.points + who.skeleton.bind[who.head, :3, 3]
-    on = rig.chains.joints[rig.weights[:, 1:].argmax(axis=1)][:, None]
-    meshes = [
-        SkinnedMesh("body", body.points, body.triangles, joints, body.joint_weights),
-        SkinnedMesh("hair", ribbon, np.arange(len(ribbon)).reshape(-1, 3), on, np.ones((len(ribbon), 1))),
-    ]
-    hair = Body(ribbon, meshes[1].triangles, on, meshes[1].joint_weights)
-    both = Body(
-        np.concatenate([body.points, hair.points]),
-        np.concatenate([body.triangles, hair.triangles + len(body.points)]),
-        np.concatenate([joints, on]),
-        np.concatenate([body.joint_weights, hair.joint_weights]),
-    )
-    rig = assemble_rig(replace(who, body=both), meshes)
+    who, body = rig.character, rig.character.body
+    body = replace(body, points=body.points - (0, away, 0))
+    rig = assembled(rig, body, who.head if not away else who.skeleton.names.index("hips"))
     assert (rig.character.body is None) == (away > 0)
     assert train_static(rig, steps=2, batch=4, report_poses=0).training["steps"] == 2
+
+
+def test_hair_does_not_sink_into_a_head_without_a_scalp():
+    """What is below hair is often left out of a head; the surface over the hole is part of the body."""
+    rig = on_a_ball()
+    body, head = rig.character.body, rig.character.head
+    high = body.points[body.triangles][:, :, 1].max(axis=1) - body.points[:, 1].mean() > 0.85 * RADIUS
+    rig = assembled(rig, replace(body, triangles=body.triangles[~high]), head)
+    below = np.array([CENTRE + (0, 0.8 * RADIUS, 0)])
+    assert -0.02 < rest_distances(rig, below)[0] < 0
 
 
 def test_other_bodies_vary_below_the_head():
