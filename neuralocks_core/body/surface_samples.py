@@ -4,6 +4,7 @@ them the nearest is.
 """
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from neuralocks_core.body.collider import closest_on_triangle
@@ -57,16 +58,14 @@ class SurfaceSamples:
         tree = cKDTree(_places(points[triangles[dense]], there))
         close = tree.query(_places(points[triangles[owners]], shares), min(CLOSE, len(dense)))[1]
         self.faces = np.stack([_distinct(own, near) for own, near in zip(owners, dense[close])])
-        self._shares = shares
-        self.corners, own = np.unique(triangles[self.faces], return_inverse=True)
-        self._own = np.zeros_like(triangles)  # each corner's place among them
-        self._own[self.faces] = own.reshape(*self.faces.shape, 3)
+        corners = triangles[owners].ravel()
+        self._shares = csr_array((shares.ravel(), corners, 3 * np.arange(count + 1)), (count, len(points)))
 
     def index(self, points: np.ndarray) -> np.ndarray:
         """What `nearest` takes of vertices (V, 3) [m]: x, y, z and x.x of each place, (4, count) float32. A matrix product of these
         with (-2 p, 1) finds the nearest to p.
         """
-        places = _places(points[self.triangles[self.faces[:, 0]]], self._shares).astype(np.float32)
+        places = (self._shares @ points).astype(np.float32)
         return np.concatenate([places.T, np.square(places).sum(axis=1)[None]])
 
     def planes(self, found, points: np.ndarray, vertices: np.ndarray, which=0):

@@ -57,10 +57,13 @@ class ChainSolver:
         for joint, parent in enumerate(chains.parents):
             if parent >= 0:
                 carries[joint] |= carries[parent]
-        self.moves, self.contact_moves = carries[chains.bone_joint], carries[owner]
-        self.groups = [np.flatnonzero(chains.chain == c) for c in range(len(chains.roots))]
-        self.group_bones = [np.flatnonzero(np.isin(chains.bone_joint, g)) for g in self.groups]
-        self.group_contacts = [np.flatnonzero(np.isin(owner, g)) for g in self.groups]
+        groups = [np.flatnonzero(chains.chain == c) for c in range(len(chains.roots))]
+        self.alike = []
+        for size in sorted({len(group) for group in groups}):
+            joints = np.stack([group for group in groups if len(group) == size])
+            self.alike.append(
+                _Alike(joints, *_driven(chains.bone_joint, joints, carries), *_driven(owner, joints, carries))
+            )
         mass = np.bincount(chains.bone_joint, tree.mass, count)
         self.contact_stiffness = (self.STIFFNESS * mass / np.maximum(np.bincount(owner, minlength=count), 1))[owner]
 
@@ -138,29 +141,29 @@ class ChainSolver:
             # d/dw of 2 k |v|^2 for a turn w applied from the left, in the carrier's axes.
             bend = -np.einsum("cnij,cnj->cni", carriers, 2 * tree.stiffness[:, None] * w * v)
             change = np.zeros_like(v)
-            for joints, bones, contacts in zip(self.groups, self.group_bones, self.group_contacts):
-                arm = ends[:, bones, None] - positions[:, None, joints]
-                arm = arm * self.moves[bones][:, joints, None]
+            for alike in self.alike:
+                joints, bones, moves = alike.joints, alike.bones, alike.moves
+                arm = (ends[:, bones, None] - positions[:, joints][:, :, None]) * moves[..., None]
                 cross = np.zeros((*arm.shape, 3))  # x moves by w x arm = -[arm] w
                 cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = arm[..., 2], -arm[..., 1], arm[..., 0]
                 cross -= np.swapaxes(cross, -1, -2)
-                count = len(joints)
-                jacobian = cross.transpose(0, 1, 3, 2, 4).reshape(len(turns), 3 * len(bones), 3 * count)
-                hessian = np.swapaxes(jacobian, 1, 2) @ (np.repeat(stiff[bones], 3)[:, None] * jacobian)
-                index = np.arange(3 * count)
-                hessian[:, index, index] += np.repeat(tree.stiffness[joints], 3) + 1e-9
-                right = np.einsum("cab,ca->cb", jacobian, force[:, bones].reshape(len(turns), -1))
-                right += bend[:, joints].reshape(len(turns), -1)
+                shape = (len(turns), len(joints), 3 * bones.shape[1], 3 * joints.shape[1])
+                jacobian = cross.transpose(0, 1, 2, 4, 3, 5).reshape(shape)
+                across = np.swapaxes(jacobian, 2, 3)
+                hessian = across @ (np.repeat(stiff[bones], 3, axis=1)[..., None] * jacobian)
+                index = np.arange(shape[-1])
+                hessian[..., index, index] += np.repeat(tree.stiffness[joints], 3, axis=1) + 1e-9
+                right = across @ force[:, bones].reshape(*shape[:3], 1)
+                right += bend[:, joints].reshape(*right.shape)
                 if near is not None:
-                    contacts = contacts[(depth[:, contacts] > 0).any(axis=0)]
-                    arm = touching[:, contacts, None] - positions[:, None, joints]
-                    arm = arm * self.contact_moves[contacts][:, joints, None]
-                    away = _cross(arm, planes[0][:, contacts, None]).reshape(len(turns), len(contacts), 3 * count)
+                    contacts, moves = alike.touching(depth)
+                    arm = (touching[:, contacts, None] - positions[:, joints][:, :, None]) * moves[..., None]
+                    away = _cross(arm, planes[0][:, contacts, None]).reshape(*shape[:2], contacts.shape[1], shape[3])
                     push = (self.contact_stiffness[contacts] * (depth[:, contacts] > 0))[..., None]
-                    hessian += np.swapaxes(away * push, 1, 2) @ away
-                    right += (np.swapaxes(away, 1, 2) @ (push * depth[:, contacts, None]))[..., 0]
-                solved = np.linalg.solve(hessian, right[..., None])[..., 0].reshape(len(turns), count, 3)
-                change[:, joints] = solved
+                    across = np.swapaxes(away * push, 2, 3)
+                    hessian += across @ away
+                    right += across @ depth[:, contacts, None]
+                change[:, joints] = np.linalg.solve(hessian, right).reshape(*shape[:2], -1, 3)
             size = np.linalg.norm(change, axis=-1, keepdims=True)
             change *= np.minimum(1, 0.6 / np.maximum(size, 1e-12))
             local = np.einsum("cnji,cnj->cni", carriers, change)
@@ -180,6 +183,43 @@ class ChainSolver:
         owner = self.contacts.joint
         arm = self.contacts.points - self.chains.origins[owner]
         return positions[:, owner] + np.einsum("cqij,qj->cqi", rotations[:, owner], arm)
+
+
+@dataclass(frozen=True)
+class _Alike:
+    """G chains of as many joints, which are solved together: calls, not arithmetic, take most of the time of a small one.
+
+    Attributes:
+        joints: (G, n).
+        bones: that they move, (G, m); those of shorter chains are repeated.
+        moves: which bone is moved by which joint, (G, m, n); a repeated one by none.
+        contacts, contact_moves: the same for contacts.
+    """
+
+    joints: np.ndarray
+    bones: np.ndarray
+    moves: np.ndarray
+    contacts: np.ndarray
+    contact_moves: np.ndarray
+
+    def touching(self, depth):
+        """`contacts` and `contact_moves` of those with a depth (C, Q) in some clip, with as many others as make rows equal."""
+        touched = (depth[:, self.contacts] > 0).any(axis=0)
+        first = np.argsort(~touched, axis=1, kind="stable")[:, : touched.sum(axis=1).max()]
+        return np.take_along_axis(self.contacts, first, 1), np.take_along_axis(self.contact_moves, first[..., None], 1)
+
+
+def _driven(owner, joints, carries):
+    """What the joints of some chains (G, n) move, of things fixed to joints `owner` (K,): their indices (G, k), and which of them are
+    moved by which joint (G, k, n). Rows end with things that none moves.
+    """
+    mine = [np.flatnonzero(np.isin(owner, group)) for group in joints]
+    indices = np.zeros((len(joints), max(map(len, mine))), int)
+    moves = np.zeros((*indices.shape, joints.shape[1]), bool)
+    for row, (own, group) in enumerate(zip(mine, joints)):
+        indices[row, : len(own)] = own
+        moves[row, : len(own)] = carries[owner[own]][:, group]
+    return indices, moves
 
 
 @dataclass(frozen=True)

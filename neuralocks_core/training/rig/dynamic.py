@@ -43,7 +43,7 @@ _POOL = 256
 """Number of bodies held ready, and as many in motion."""
 _HELD, _MOVING, _WORST = 16, 8, 8
 """Bodies in held poses, in motion, and in the poses in which hair lies deepest, whose contact counts in a step."""
-_CLIP_TAKES, _POSING_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.3, 8.0, 0.03, 40.0
+_CLIP_TAKES, _POSING_TAKES, _STEP_TAKES, _REPORT_TAKES = 0.5, 8.0, 0.03, 40.0
 """Approximate time that each takes [s], for even progress."""
 _MOMENTS = 16
 """Moments of each simulated motion, from which the bodies in motion are drawn."""
