@@ -23,7 +23,8 @@ class HairRig:
     """What training, report and pictures need from a rig.
 
     Attributes:
-        character: its body holds no hair; it has none if nothing is in the hair's reach, as with only shoes.
+        character: its body holds no hair, and its holes are closed; it has none if nothing is in the hair's reach, as with only
+            shoes.
         chains: the hair joints.
         points: vertices that the hair joints move, canonical bind pose, (V, 3) [m].
         weights: on the head and on each hair joint, (V, 1 + N).
