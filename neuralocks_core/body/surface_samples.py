@@ -40,30 +40,33 @@ class SurfaceSamples:
             ear's small ones.
 
     Attributes:
+        vertices: those of the mesh that are read (U,), however many it has: corners of the faces around places, and of the faces
+            that meet there.
         faces: the triangles around each place, its own first, (count, AROUND).
-        triangles: as given.
-        corners: the vertices of all these triangles (U,), at most 3 * AROUND * count: all that `planes` reads.
-        open: whether a part of a triangle, in the order of `closest_on_triangle`, lies on an edge that no other shares,
-            (F, 7): across it, nothing says what is inside.
+        triangles: those that are read, (f, 3) indices into `vertices`.
+        open: whether a part of a triangle, in the order of `closest_on_triangle`, lies on an edge that no other of the mesh shares,
+            (f, 7): across it, nothing says what is inside.
     """
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray, count: int):
-        self.triangles = triangles
-        self._corners = welded_vertices(points)[1][triangles]
-        self.open = _open_parts(self._corners)
-        self._ring = np.argsort(self._corners, axis=None, kind="stable") // 3
-        self._rings = np.searchsorted(np.sort(self._corners, axis=None), np.arange(self._corners.max() + 2))
         owners, shares = _spread(points, triangles, count)
         dense, there = _spread(points, triangles, DENSER * count)
         tree = cKDTree(_places(points[triangles[dense]], there))
         close = tree.query(_places(points[triangles[owners]], shares), min(CLOSE, len(dense)))[1]
-        self.faces = np.stack([_distinct(own, near) for own, near in zip(owners, dense[close])])
-        corners = triangles[owners].ravel()
-        self._shares = csr_array((shares.ravel(), corners, 3 * np.arange(count + 1)), (count, len(points)))
+        faces = np.stack([_distinct(own, near) for own, near in zip(owners, dense[close])])
+        corners = welded_vertices(points)[1][triangles]
+        read = np.flatnonzero(np.isin(corners, corners[np.unique(faces)]).any(axis=1))
+        self.faces, self.open, self._corners = np.searchsorted(read, faces), _open_parts(corners)[read], corners[read]
+        self.vertices, own = np.unique(triangles[read], return_inverse=True)
+        self.triangles = own.reshape(-1, 3)
+        self._ring = np.argsort(self._corners, axis=None, kind="stable") // 3
+        self._rings = np.searchsorted(np.sort(self._corners, axis=None), np.arange(self._corners.max() + 2))
+        own = self.triangles[self.faces[:, 0]].ravel()
+        self._shares = csr_array((shares.ravel(), own, 3 * np.arange(count + 1)), (count, len(self.vertices)))
 
     def index(self, points: np.ndarray) -> np.ndarray:
-        """What `nearest` takes of vertices (V, 3) [m]: x, y, z and x.x of each place, (4, count) float32. A matrix product of these
-        with (-2 p, 1) finds the nearest to p.
+        """What `nearest` takes of `vertices` at (U, 3) [m]: x, y, z and x.x of each place, (4, count) float32. A matrix product of
+        these with (-2 p, 1) finds the nearest to p.
         """
         places = (self._shares @ points).astype(np.float32)
         return np.concatenate([places.T, np.square(places).sum(axis=1)[None]])
@@ -75,17 +78,17 @@ class SurfaceSamples:
         Args:
             found: for each point the `nearest` place (N,).
             points: (N, 3) [m].
-            vertices: of several poses, (P, V, 3).
+            vertices: where `vertices` are in several poses, (P, U, 3).
             which: the pose of each point, (N,).
 
         Returns:
             unit normals (N, 3) and offsets (N,) [m]: the distance of x is n.x - d.
         """
         which, face = np.broadcast_to(which, np.shape(found)), self.faces[found, 0]
-        place, part = closest_on_triangle(points, *vertices[which, self._own[face].T])
+        place, part = closest_on_triangle(points, *vertices[which, self.triangles[face].T])
         near = np.flatnonzero(np.square(points - place).sum(axis=1) < NEAR**2)
         some = self.faces[found[near]]
-        corners = np.moveaxis(vertices[which[near, None, None], self._own[some]], 2, 0)
+        corners = np.moveaxis(vertices[which[near, None, None], self.triangles[some]], 2, 0)
         places, parts = closest_on_triangle(points[near, None], *corners)
         rows, least = np.arange(len(near)), np.square(points[near, None] - places).sum(axis=-1).argmin(axis=1)
         place[near], part[near], face[near] = places[rows, least], parts[rows, least], some[rows, least]

@@ -21,6 +21,7 @@ class BodyPatch:
     Attributes:
         body: that part, with blend shapes that leave the head unchanged.
         samples: `count` places on it.
+        read: the vertices that `samples` read of it, with its blend shapes.
     """
 
     @classmethod
@@ -38,14 +39,15 @@ class BodyPatch:
             shapes[name] = (offsets - mean) * (1 - on_head)[:, None]
         self.body = replace(near, shapes=shapes)
         self.samples = SurfaceSamples(near.points, near.triangles, count)
+        self.read = self.body.part(self.samples.vertices, self.samples.triangles)
 
     def met(self, rig: HairRig, joints: np.ndarray) -> BodyMesh:
         """What a simulation meets, under world joint transforms (C, T, J, 4, 4)."""
-        posed = np.empty((*joints.shape[:2], *self.body.points.shape), np.float32)
+        posed = np.empty((*joints.shape[:2], *self.read.points.shape), np.float32)
         for clip, poses in zip(posed, joints):
             for row, skinning in zip(clip, rig.character.skinning(poses)):
-                row[:] = self.body.posed(skinning)
-        return BodyMesh(self.samples, posed, rig.character.canonical(self.body.points))
+                row[:] = self.read.posed(skinning)
+        return BodyMesh(self.samples, posed, rig.character.canonical(self.read.points))
 
 
 def posed_distances(rig: HairRig, joints: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -73,7 +75,7 @@ def rest_clearance(rig: HairRig, points: np.ndarray) -> np.ndarray:
     exact, patch = rest_distances(rig, points), BodyPatch.of(rig, KEPT)
     if patch is None or not len(points):
         return exact
-    vertices, samples = rig.character.canonical(patch.body.points), patch.samples
+    vertices, samples = rig.character.canonical(patch.read.points), patch.samples
     found = nearest(samples.index(vertices), points)
     normals, offsets = samples.planes(found, points, vertices[None])
     return np.minimum(exact, np.einsum("vi,vi->v", points, normals) - offsets)

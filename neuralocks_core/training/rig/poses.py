@@ -49,7 +49,8 @@ class PosePool:
         self._patch = BodyPatch.of(rig, KEPT) if len(rig.points) else None
         self.shapes = np.zeros((count, len(self._patch.body.shapes) if self._patch else 0))
         if self._patch:
-            self.bodies = np.empty((count, len(self._patch.body.points), 3), np.float32)
+            # Of a whole body of 90,000 vertices, 512 poses are half a gigabyte.
+            self._read = np.empty((count, len(self._patch.read.points), 3), np.float32)
             self._index = np.empty((count, 4, KEPT), np.float32)
             self._joints = np.unique(self._patch.body.joint_indices)
             self._skinning = np.empty((count, len(self._joints), 4, 4))
@@ -78,14 +79,17 @@ class PosePool:
             return rows
         self.shapes[rows] = np.clip(self._rng.normal(0, 0.35, (count, self.shapes.shape[1])), -0.8, 0.8)
         skinning = np.linalg.inv(skinning[:, head] @ character.canonical_to_bind)[:, None] @ skinning
+        self._skinning[rows] = skinning[:, self._joints]
         for row, matrices in zip(rows, skinning):
-            self.bodies[row] = body = self._patch.body.posed(matrices, self.shapes[row])
-            self._index[row] = self._patch.samples.index(body)
+            self._read[row] = read = self._patch.read.posed(matrices, self.shapes[row])
+            self._index[row] = self._patch.samples.index(read)
         return rows
 
     def body(self, pose: int) -> np.ndarray:
         """Vertices of the body around the head in a pose, (V, 3) float32 [m], canonical."""
-        return self._posed(pose).astype(np.float32)
+        matrices = np.zeros((len(self.rig.character.skeleton.names), 4, 4))
+        matrices[self._joints] = self._skinning[pose]
+        return self._patch.body.posed(matrices, self.shapes[pose]).astype(np.float32)
 
     def gravity(self, poses: np.ndarray) -> np.ndarray:
         """Random directions of gravity in the head's frame (n, 3): the trunk leans, sometimes lies, seldom hangs
@@ -109,7 +113,7 @@ class PosePool:
         """
         found = np.concatenate([nearest(self._index[pose], some) for pose, some in zip(poses, points)])
         normals, offsets = self._patch.samples.planes(
-            found, points.reshape(-1, 3), self.bodies, np.repeat(poses, points.shape[1])
+            found, points.reshape(-1, 3), self._read, np.repeat(poses, points.shape[1])
         )
         return normals.reshape(points.shape), offsets.reshape(points.shape[:2])
 
@@ -129,11 +133,6 @@ class PosePool:
             for done, _ in enumerate(pool.map(measure, rows), 1):
                 progress(done, len(rows), "measuring what lies in the body")
         return result
-
-    def _posed(self, pose: int) -> np.ndarray:
-        matrices = np.zeros((len(self.rig.character.skeleton.names), 4, 4))
-        matrices[self._joints] = self._skinning[pose]
-        return self._patch.body.posed(matrices, self.shapes[pose])
 
 
 def _random_skinning(character, count, rng) -> np.ndarray:

@@ -14,8 +14,9 @@ RADIUS = 0.12
 
 
 def distances(samples: SurfaceSamples, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
-    found = nearest(samples.index(vertices), points)
-    normals, offsets = samples.planes(found, points, vertices[None])
+    read = vertices[samples.vertices]
+    found = nearest(samples.index(read), points)
+    normals, offsets = samples.planes(found, points, read[None])
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
     return (points * normals).sum(axis=1) - offsets
 
