@@ -10,6 +10,7 @@ import trimesh
 
 torch = pytest.importorskip("torch")
 
+from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.reference.chain_contact import BodyMesh, Contacts
 from neuralocks_core.reference.chains import ChainSolver
@@ -26,6 +27,8 @@ from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig.body import BodyPatch, rest_distances
 from neuralocks_core.training.rig.contact import HairOnBodies, Moments
 from neuralocks_core.training.rig.energy import RigEnergy
+from neuralocks_core.training.rig.motion import simulate_motions
+from neuralocks_core.training.rig.poses import PosePool
 from neuralocks_core.training.rig.report import hair_points, no_turns
 from neuralocks_core.training.rig.static import train_static
 from tests.core.rig.builders import character, tail
@@ -111,6 +114,17 @@ def test_a_large_lock_collides_with_more_points():
     mine = contacts.points[contacts.joint == 0]
     gaps = np.linalg.norm(bun[:, None] - mine[None], axis=-1).min(axis=1)
     assert len(mine) > 20 and gaps.max() < 0.045
+
+
+def test_bones_without_a_mesh_meet_the_body_in_a_simulation():
+    """By their ends and middles; networks learn from a mesh alone."""
+    rig = on_a_ball()
+    bare = replace(rig, points=rig.points[:0], weights=rig.weights[:0])
+    bow = [scripted_clip(bare.character, "bow", 2.0)]
+    free = replace(bare, character=replace(bare.character, body=None))
+    met, not_met = (simulate_motions(some, RigMaterial(bend=1e-4), rig_spec(), bow)[1] for some in (bare, free))
+    assert np.abs(met - not_met).max() > 0.01
+    assert not PosePool(bare, 2, np.random.default_rng(0)).collides
 
 
 def test_contacts_are_the_corners_of_each_joint():
