@@ -76,8 +76,8 @@ $(VENV)/installed-test: pyproject.toml constraints.txt | $(BIN)/python
 
 # Blender as a Python module, the oldest and the newest that the extension supports; where the interpreter or the
 # wheel is missing, the tests that need it say so and are skipped. Only `make matrix` installs the versions between, 1.3 GB
-# each; to it, a missing one is an error. The scenarios of one version take 3:05 to 3:50 minutes of processor time, and took
-# 12 to 20 minutes beside other work on two cores; the other tests of all versions take 2:12.
+# each; to it, a missing one is an error. The scenarios of one version take 3:05 to 3:50 minutes of processor time, the other
+# tests of all versions 2:12.
 BLENDER_NEEDS = onnxruntime usd-core scipy
 # The first of that version that really runs: a version manager's stand-in may only say that it does not.
 find-python = $(shell for p in python$(1) $(HOME)/.pyenv/versions/$(1)*/bin/python$(1); do \

@@ -107,9 +107,10 @@ def forget_gone() -> None:
     """Drop messages about objects that were renamed or deleted: another object may get such a name. So is hair that was prepared for
     one: a large groom holds hundreds of megabytes.
     """
-    for kept in (session.messages, session.misrendered, session.cards, session.hairs):
-        for name in [name for name in kept if find(name) is None]:
-            del kept[name]
+    kept = session.messages, session.misrendered, session.cards, session.hairs
+    for gone in [name for name in set().union(*kept) if find(name) is None]:
+        for each in kept:
+            each.pop(gone, None)
 
 
 def forget_ended() -> None:

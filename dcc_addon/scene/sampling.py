@@ -50,8 +50,10 @@ def in_slices(context, armature, seconds: float = math.inf) -> Iterator[tuple[in
     scene, name = context.scene, armature.name_full
     while True:
         key, frames = key_of(armature, scene), _sample(context, scene, armature)
-        while key == key_of(armature, scene):
-            end = time.perf_counter() + seconds
+        while True:
+            end = time.perf_counter() + seconds  # in a large scene, comparing takes a part of the slice
+            if key != key_of(armature, scene):
+                break
             with stepping(scene):
                 reached = next((each for each in frames if time.perf_counter() > end), None)
             if reached is None:

@@ -1,34 +1,40 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closing the holes of a body's surface: many avatars have no scalp below their hair, and hair that sinks into the head there meets
-nothing.
-"""
+"""Closing the holes of a head: many avatars have no scalp below their hair, and hair that sinks into the head there meets nothing."""
 
 import numpy as np
 
-from neuralocks_core.mesh import welded_pieces, welded_vertices
+from neuralocks_core.mesh import connected_pieces, welded_vertices
 
 LARGEST = 0.25
-"""A hole is closed if it is smaller than this share of its part's surface: an eyebrow, a ribbon or a skirt is all rim."""
+"""A hole is closed if it is smaller than this share of its part's surface: an eyebrow or a ribbon is all rim."""
+DOWN = -0.5
+"""Sine of how steeply a hole may face down: through that of a hat comes the head, through that of a head the neck."""
 
 
-def closed_holes(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Triangles (F', 3) that close the holes of a mesh, none of whose vertices they add, so that they move with it.
+def closed_holes(points: np.ndarray, triangles: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """Triangles (F', 3) that close the holes of a head, none of whose vertices they add, so that they move with it.
 
     Args:
-        points: (V, 3) [m].
+        points: (V, 3) [m], y up.
         triangles: (F, 3), outward.
+        head: which vertices are the head's, (V,) bool: holes with others on the rim, such as collars and sleeves, are open for
+            what is in them.
     """
     place = welded_vertices(points)[1]
     ways = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    there, back = place[ways] @ [len(points), 1], place[ways] @ [1, len(points)]
-    rim = ways[~np.isin(there, back)]
-    if not len(rim):
+    there, back = place[ways] @ [len(points), 1], np.sort(place[ways] @ [1, len(points)])
+    rim = ways[back[np.minimum(np.searchsorted(back, there), len(back) - 1)] != there]
+    lids = [_lid(loop) for loop in _loops(rim, place) if head[loop].all()]
+    if not lids:
         return np.zeros((0, 3), int)
-    piece = welded_pieces(points, triangles)
-    room = np.bincount(piece[triangles[:, 0]], _areas(points, triangles), piece.max() + 1)
-    lids = [_lid(loop) for loop in _loops(rim, place)]
-    kept = [lid for lid in lids if _areas(points, lid).sum() < LARGEST * room[piece[lid[0, 0]]]]
-    return np.concatenate(kept) if kept else np.zeros((0, 3), int)
+    piece = connected_pieces(place[triangles], len(points))[place]
+    room = np.bincount(piece[triangles[:, 0]], np.linalg.norm(_areas(points, triangles), axis=1), piece.max() + 1)
+    every, firsts = np.concatenate(lids), np.cumsum([0] + [len(lid) for lid in lids[:-1]])
+    areas = _areas(points, every)
+    size, across = np.linalg.norm(areas, axis=1), np.add.reduceat(areas, firsts)
+    small = np.add.reduceat(size, firsts) < LARGEST * room[piece[every[firsts, 0]]]
+    kept = small & (across[:, 1] > DOWN * np.linalg.norm(across, axis=1))
+    return every[np.repeat(kept, [len(lid) for lid in lids])]
 
 
 def _loops(rim: np.ndarray, place: np.ndarray) -> list[np.ndarray]:
@@ -37,9 +43,8 @@ def _loops(rim: np.ndarray, place: np.ndarray) -> list[np.ndarray]:
     plain = (np.bincount(start)[start] == 1) & (np.bincount(end)[end] == 1)
     follows = {int(a): (int(b), vertex) for a, b, vertex in zip(start[plain], end[plain], rim[plain, 0])}
     loops = []
-    while follows:
-        first = at = next(iter(follows))
-        loop = []
+    for first in list(follows):
+        at, loop = first, []
         while at in follows:
             at, vertex = follows.pop(at)
             loop.append(vertex)
@@ -58,5 +63,6 @@ def _lid(loop: np.ndarray) -> np.ndarray:
 
 
 def _areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Normals (F, 3) as long as the triangles' areas."""
     a, b, c = points[triangles.T]
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.cross(b - a, c - a) / 2

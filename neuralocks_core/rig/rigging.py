@@ -23,8 +23,8 @@ class HairRig:
     """What training, report and pictures need from a rig.
 
     Attributes:
-        character: its body holds no hair, and its holes are closed; it has none if nothing is in the hair's reach, as with only
-            shoes.
+        character: its body holds no hair, and holes of its head are closed; it has none if nothing is in the hair's reach, as
+            with only shoes.
         chains: the hair joints.
         points: vertices that the hair joints move, canonical bind pose, (V, 3) [m].
         weights: on the head and on each hair joint, (V, 1 + N).
@@ -38,15 +38,22 @@ class HairRig:
     triangles: np.ndarray
 
     def with_body(self, body: Body | None) -> "HairRig":
-        """The same hair with another body, or with none if that is out of its reach."""
-        near = body is not None and self.in_reach(body).any()
-        return replace(self, character=replace(self.character, body=body if near else None))
+        """The same hair with another body, the holes of whose head are closed, or with none if that is out of its reach."""
+        who = self.character
+        if body is None or not self.in_reach(body).any():
+            return replace(self, character=replace(who, body=None))
+        of_head = who.skeleton.below(who.head)[body.joint_indices]
+        head = np.sum(body.joint_weights * of_head, axis=1) > 0.5
+        lids = closed_holes(who.canonical(body.points), body.triangles, head)
+        body = replace(body, triangles=np.concatenate([body.triangles, lids]))
+        return replace(self, character=replace(who, body=body))
 
     def in_reach(self, body: Body) -> np.ndarray:
         """Which triangles (F,) bool of the character's body the hair could touch."""
-        hair = np.concatenate([self.points, self.chains.origins])
+        chains = self.chains
+        hair = np.concatenate([self.points, chains.origins, chains.origins[chains.bone_joint] + chains.bones])
         away = np.linalg.norm(self.character.canonical(body.points), axis=1)
-        return (away < np.linalg.norm(hair, axis=1).max() + ROOM)[body.triangles].all(axis=1)
+        return (away < np.linalg.norm(hair, axis=1).max() + ROOM)[body.triangles].any(axis=1)
 
 
 def assemble_rig(
@@ -77,7 +84,6 @@ def assemble_rig(
     body = character.body
     if body is not None:
         faces = np.concatenate(body_triangles) if body_triangles else np.zeros((0, 3), int)
-        faces = np.concatenate([faces, closed_holes(body.points, faces)])
         body = Body(body.points, faces, body.joint_indices, body.joint_weights, body.shapes) if len(faces) else None
     rig = HairRig(
         character,

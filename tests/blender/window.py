@@ -64,7 +64,7 @@ def mouse(below=None, click=False):
     area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
     side = next(r for r in area.regions if r.type == "UI")
     top = window.height - (side.y + side.height)
-    x, y = (side.x + side.width - 12, top + TAB) if below == TAB else (side.x + side.width // 2, top + (below or 500))
+    x, y = (side.x + side.width - 12, top + TAB) if below == TAB else (side.x + side.width // 2, top + (below or 300))
     subprocess.run(["xdotool", "mousemove", str(x if below else 300), str(y)], check=True)
 
 

@@ -46,7 +46,7 @@ def author_curves(
     curves.CreatePointsAttr(vectors(points))
     curves.CreateCurveVertexCountsAttr(integers(counts))
     if len(widths) == len(counts) > 1:
-        # Blender reads one width a vertex, beyond the end if there are fewer.
+        # Blender reads one width for all, or one a vertex, beyond their end if there are fewer.
         widths = np.repeat(widths, counts)
     kind = UsdGeom.Tokens.constant if len(widths) == 1 else UsdGeom.Tokens.vertex
     if as_primvar:

@@ -100,6 +100,30 @@ def driven_since(folder: Path) -> None:
     assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
 
 
+def drivers_told(_folder: Path) -> None:
+    """Each edit of a driver changes the number of drivers."""
+    from dcc_addon.scene.driven import number_of_drivers
+
+    rig, skin = _character()
+    curve = skin.data.shape_keys.animation_data.drivers[0]
+    limits = curve.modifiers.new("LIMITS")
+    variable = curve.driver.variables[0]
+    variable.type, target = "SINGLE_PROP", variable.targets[0]
+    target.id, target.data_path = rig, 'pose.bones["neck"].rotation_euler[0]'
+    seen = [number_of_drivers(skin.data)]
+    for edit in (
+        lambda: setattr(target, "data_path", 'pose.bones["head"].rotation_euler[0]'),
+        lambda: setattr(target, "data_path", 'pose.bones["head"].rotation_euler[1]'),
+        lambda: setattr(curve.driver, "use_self", True),
+        lambda: setattr(limits, "max_y", 2.0),
+        lambda: setattr(curve, "data_path", 'key_blocks["Held"].value'),
+    ):
+        edit()
+        found = number_of_drivers(skin.data)
+        assert found not in seen, len(seen)
+        seen.append(found)
+
+
 def _character() -> tuple:
     """A dancing rig with hair and a body with shape keys: held, keyed and driven by the neck."""
     scenes.empty()

@@ -92,7 +92,7 @@ def one_of_two_taken_off(folder: Path) -> None:
 
 def one_radius_each(folder: Path) -> None:
     """Where strands get one radius each, their cache with widths is off until the next bake: Blender since 5.0 would crash, or write
-    beyond the radii. That bake leaves the radii alone, and other programs find them in the file all the same.
+    beyond the radii. That bake leaves the radii alone, and renderers that read primvars find them in the file all the same.
     """
     needs_usd()
     if bpy.app.version < (5, 0):

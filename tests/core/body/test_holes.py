@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Holes of bodies: closed where they are small, whichever way files split a skin."""
+"""Holes of heads: closed where they are small, whichever way files split a skin."""
 
 import numpy as np
 import pytest
 import trimesh
 
+from neuralocks_core.body import holes
 from neuralocks_core.body.enclosed import enclosed
-from neuralocks_core.body.holes import closed_holes
 
 RADIUS = 0.12
 
@@ -16,6 +16,11 @@ def cut(above: float):
     ball = trimesh.creation.icosphere(3, RADIUS)
     points, faces = np.array(ball.vertices), np.array(ball.faces)
     return points, faces[(points[faces][:, :, 1] <= above).all(axis=1)]
+
+
+def closed_holes(points, faces, turn=None, head=True):
+    """Lids of a turned mesh that is the head's or not."""
+    return holes.closed_holes(points if turn is None else points @ turn.T, faces, np.full(len(points), head))
 
 
 @pytest.mark.parametrize("seams", [False, True])
@@ -42,12 +47,23 @@ def test_a_bowl_stays_open(above):
     assert len(closed_holes(*cut(RADIUS))) == 0
 
 
+def test_what_has_something_in_it_stays_open():
+    """A collar, which is not the head's, and a hat, which is open below; the ear of a head is at its side."""
+    points, faces = cut(0.8 * RADIUS)
+    down, aside = np.diag([1.0, -1.0, -1.0]), np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    assert len(closed_holes(points, faces, head=False)) == 0 == len(closed_holes(points, faces, down))
+    assert len(closed_holes(points, faces, aside)) == len(closed_holes(points, faces)) > 0
+    of_neck = np.ones(len(points), bool)
+    of_neck[faces[points[faces][:, :, 1].max(axis=1).argmax()]] = False
+    assert len(holes.closed_holes(points, faces, of_neck)) == 0
+
+
 def test_holes_that_touch_stay_open():
     """Of rims that meet in one vertex, nothing says which belong together; other holes are closed."""
     points, faces = cut(RADIUS)
     around = np.flatnonzero((faces == faces[0, 0]).any(axis=1))
     apart = [face for face in around[1:] if len(np.intersect1d(faces[face], faces[around[0]])) == 1]
-    far = int(points[faces].mean(axis=1)[:, 1].argmin())
-    holes = [around[0], apart[0], far]
-    lid = closed_holes(points, np.delete(faces, holes, axis=0))
+    far = int(points[faces].mean(axis=1)[:, 0].argmin())
+    gone = [around[0], apart[0], far]
+    lid = closed_holes(points, np.delete(faces, gone, axis=0))
     assert len(lid) == 1 and set(lid[0]) == set(faces[far])
