@@ -222,9 +222,10 @@ def _by_conversion(name, strands, points_of, empty):
     tree.links.new(source, convert.inputs[0])
     tree.links.new(convert.outputs[0], target)
     holder.modifiers.new("convert", "NODES").node_group = tree
-    for other in bpy.context.selected_objects:
+    layer = bpy.context.view_layer
+    for other in list(layer.objects.selected):
         other.select_set(False)
-    bpy.context.view_layer.objects.active = holder
+    layer.objects.active = holder
     holder.select_set(True)
     bpy.ops.object.convert(target="CURVES")
     data = holder.data

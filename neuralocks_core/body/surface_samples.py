@@ -16,7 +16,9 @@ AROUND = 6
 """Faces among which the nearest one is looked for."""
 NEAR = 0.03
 """[m] Farther from the face of the nearest place than this, the others are not looked at."""
-DENSER, CLOSE = 8, 32
+WIDELY = 32
+"""The same for points that seem to be inside: of thin parts, such as ears, the faces around a place may all be of the far side."""
+DENSER, CLOSE = 8, 160
 """These are the first different ones of the faces at the CLOSE nearest of DENSER times as many places."""
 _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
 """Multiples of these, modulo 1, fill a square evenly (the R2 sequence)."""
@@ -42,7 +44,7 @@ class SurfaceSamples:
     Attributes:
         vertices: those of the mesh that are read (U,), however many it has: corners of the faces around places, and of the faces
             that meet there.
-        faces: the triangles around each place, its own first, (count, AROUND).
+        faces: the triangles around each place, its own first, (count, WIDELY).
         triangles: those that are read, (f, 3) indices into `vertices`.
         open: whether a part of a triangle, in the order of `closest_on_triangle`, lies on an edge that no other of the mesh shares,
             (f, 7): across it, nothing says what is inside.
@@ -86,13 +88,19 @@ class SurfaceSamples:
         """
         which, face = np.broadcast_to(which, np.shape(found)), self.faces[found, 0]
         place, part = closest_on_triangle(points, *vertices[which, self.triangles[face].T])
-        near = np.flatnonzero(np.square(points - place).sum(axis=1) < NEAR**2)
-        some = self.faces[found[near]]
-        corners = np.moveaxis(vertices[which[near, None, None], self.triangles[some]], 2, 0)
-        places, parts = closest_on_triangle(points[near, None], *corners)
-        rows, least = np.arange(len(near)), np.square(points[near, None] - places).sum(axis=-1).argmin(axis=1)
-        place[near], part[near], face[near] = places[rows, least], parts[rows, least], some[rows, least]
+
+        def look(rows: np.ndarray, among: int) -> None:
+            some = self.faces[found[rows], :among]
+            corners = np.moveaxis(vertices[which[rows, None, None], self.triangles[some]], 2, 0)
+            places, parts = closest_on_triangle(points[rows, None], *corners)
+            every, least = np.arange(len(rows)), np.square(points[rows, None] - places).sum(axis=-1).argmin(axis=1)
+            place[rows], part[rows], face[rows] = places[every, least], parts[every, least], some[every, least]
+
+        look(np.flatnonzero(np.square(points - place).sum(axis=1) < NEAR**2), AROUND)
         out = self._outward(face, part, vertices, which)
+        doubted = np.flatnonzero(np.einsum("ni,ni->n", points - place, out) < 0)
+        look(doubted, WIDELY)
+        out[doubted] = self._outward(face[doubted], part[doubted], vertices, which[doubted])
         away = points - place
         length = np.linalg.norm(away, axis=1, keepdims=True)
         inside = np.einsum("ni,ni->n", away, out)[:, None] < 0
@@ -152,9 +160,9 @@ def _places(corners: np.ndarray, shares: np.ndarray) -> np.ndarray:
 
 
 def _distinct(own: int, near: np.ndarray) -> np.ndarray:
-    """The first AROUND of the faces own and near (n,), each once; own again where there are too few."""
-    found = list(dict.fromkeys([own, *near.tolist()]))[:AROUND]
-    return np.array(found + [own] * (AROUND - len(found)))
+    """The first WIDELY of the faces own and near (n,), each once; own again where there are too few."""
+    found = list(dict.fromkeys([own, *near.tolist()]))[:WIDELY]
+    return np.array(found + [own] * (WIDELY - len(found)))
 
 
 def _open_parts(triangles: np.ndarray) -> np.ndarray:

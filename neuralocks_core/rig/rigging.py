@@ -53,7 +53,7 @@ class HairRig:
         chains = self.chains
         hair = np.concatenate([self.points, chains.origins, chains.origins[chains.bone_joint] + chains.bones])
         away = np.linalg.norm(self.character.canonical(body.points), axis=1)
-        return (away < np.linalg.norm(hair, axis=1).max() + ROOM)[body.triangles].any(axis=1)
+        return (away < np.linalg.norm(hair, axis=1).max() + ROOM)[body.triangles].all(axis=1)
 
 
 def assemble_rig(

@@ -12,7 +12,7 @@ import numpy as np
 from dcc_addon.scene import binding
 from dcc_addon.session import session
 from tests.blender import scenes
-from tests.blender.checks import SAME, apart, baked_points, body_sampled, make_live, points_at, refused
+from tests.blender.checks import SAME, apart, baked_points, body_sampled, choose, make_live, points_at, refused
 
 
 def body_as_drawn(_folder: Path) -> None:
@@ -70,7 +70,8 @@ def mirror_object_moved(folder: Path) -> None:
     mirror, middle = body.modifiers.new("Mirror", "MIRROR"), bpy.data.objects.new("Middle", None)
     scene.collection.objects.link(middle)
     mirror.mirror_object, mirror.use_mirror_merge = middle, False
-    body.modifiers.move(1, 0)
+    choose(body)
+    bpy.ops.object.modifier_move_to_index(modifier="Mirror", index=0)
     bpy.context.view_layer.update()
     make_live(rig, strands)
     scene.frame_set(9)

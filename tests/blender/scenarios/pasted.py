@@ -3,6 +3,7 @@
 
 import shutil
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 
@@ -35,6 +36,8 @@ def pasted(folder: Path) -> None:
             _copied(model)
         bpy.ops.wm.open_mainfile(filepath=str(shots / "shot.blend"))
         _copied(model)
+        if bpy.app.version < (4, 0):
+            raise SkipTest("this Blender does not tell where it saves to")
         bpy.ops.wm.save_as_mainfile(filepath=str(later / "shot.blend"))
         assert bpy.data.objects["Hair"].neuralocks_hair.model == "//../shots/mine.neuralocks"
         _copied(model)

@@ -4,6 +4,7 @@
 import shutil
 import zlib
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 
@@ -150,6 +151,8 @@ def keys_set_since(folder: Path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     own.rig_model = "//rig.neuralocks"
     assert not _told("Bake to Keyframes")
+    if bpy.app.version < (4, 0):
+        raise SkipTest("this Blender does not tell where it saves to")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "later" / "shot.blend"))
     assert not _told("Bake to Keyframes") and own.rig_model == "//../rig.neuralocks", "the same model"
     (folder / "rig.neuralocks").rename(folder / "away.neuralocks")

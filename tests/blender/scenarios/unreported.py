@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 
 from tests.blender import scenes
-from tests.blender.checks import make_live
+from tests.blender.checks import choose, make_live
 
 
 def edited_in_another_scene(_folder: Path) -> None:
@@ -67,7 +67,8 @@ def _raised_head(hide=None) -> tuple:
         raised.keyframe_insert("value", frame=frame)
     mirror = skin.modifiers.new("Mirror", "MIRROR")
     mirror.show_viewport = mirror.show_render = False
-    skin.modifiers.move(1, 0)
+    choose(skin)
+    bpy.ops.object.modifier_move_to_index(modifier="Mirror", index=0)
     if hide:
         hide(skin)
     make_live(rig, strands, resolve=True)
