@@ -22,6 +22,8 @@ _WIDTH = 8
 """Columns of a layer are a multiple of this, the width of vector units."""
 _ENTRIES = 128
 """Of the history in history.h.in, a power of two."""
+_FINEST = 2.0**17
+"""Units of the history's numbers are at least this fine: the shortest step that a push takes, 1e-5 s, must not be zero."""
 HISTORY_BYTES = 5_768
 """Size of the struct of history.h.in; a dynamic model needs one per character."""
 MADE = "Made by `neuralocks rig export-c`"
@@ -47,7 +49,8 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
 
     Raises:
         NeuralocksError: the name or the prefix cannot be used, the folder cannot be written, a file of somebody else's has the
-            header's or the example's name, or the model reads inputs that the header does not compute.
+            header's or the example's name, the model reads inputs that the header does not compute or clamps those of a pose, or its
+            history is too long.
     """
     path = Path(path)
     if path.suffix not in (".h", ".hpp"):
@@ -64,8 +67,13 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
         raise NeuralocksError(f"--prefix {prefix}: is not a C name; use letters, digits and _")
     known = rig_spec(model.dynamic)
     read_alike = all(getattr(model.spec, name) == getattr(known, name) for name in ("pose_joints", "linear", "chest"))
-    if not read_alike or model.limits[: POSE - 3].min() < 1.01:  # the header does not clamp entries of rotations
+    if not read_alike:
         raise NeuralocksError("model: it reads other inputs than a header computes; train it with neuralocks rig train")
+    if (least := model.limits[: POSE - 3].min()) < 1.01:
+        raise NeuralocksError(
+            f"model: it clamps entries of rotations to {least:.3g}, a header leaves them as they are, up to 1; "
+            "give it the limits of neuralocks_core.rig.network.input_limits, or train it with neuralocks rig train"
+        )
     for target, text in (
         (path, header_text(model, prefix)),
         (beside, _example(model, path.name, prefix)),
@@ -81,10 +89,10 @@ def example_beside(path: Path) -> Path:
 
 
 def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
-    """The text of the header: the template rig/hair.h.in with the model's numbers in place of @NAME@."""
+    """The text of the header: the templates rig/hair.h.in and, for a dynamic model, rig/history*.h.in, filled in."""
     text = (_TEXTS / "hair.h.in").read_text(encoding="utf-8")
-    history = (_TEXTS / "history.h.in").read_text(encoding="utf-8") if model.dynamic else ""
-    text = text.replace("@HISTORY@", history)
+    parts = ("history.h.in", "history_read.h.in") if model.dynamic else ()
+    text = text.replace("@HISTORY@", "".join((_TEXTS / part).read_text(encoding="utf-8") for part in parts))
     text = _parts_for(model, text)
     chains = model.chains
     size = np.float32(np.sin(model.max_angle / 2))
@@ -114,11 +122,23 @@ def header_text(model: RigModel, prefix: str = "nl_hair") -> str:
 
 
 def _history(spec: BoundarySpec) -> dict[str, str]:
-    """What history.h.in says of the bins. Its times and integrals are 32-bit integers: as fine as these allow, if what is read of an
-    integral must not reach round the whole range (16 is more than any of them grows in a second), and no turn either.
+    """What the history's templates say of the bins. Its times and integrals are 32-bit integers, as fine as these allow if no
+    difference that a read takes reaches round half the range.
+
+    Raises:
+        NeuralocksError: bins or the whole history are so long that the numbers would be too coarse.
     """
-    longest = (spec.steps + 2) * spec.dt
-    unit = 2.0 ** np.floor(np.log2(2**31 / max(16 * longest, 32)))
+    longest, widest = (spec.steps + 2) * spec.dt, max(spec.bins, default=0) * spec.dt
+    # Ends of a bin in different entries differ by whole entries. Two pauses hold 6 g of a kick each, one also gravity and wind, of
+    # 3 g along each axis; frames beside them in the bin as much of both. Frames alone turn by at most 100 rad/s, and 500 of them a
+    # second pass on at most 6 g for a step in each.
+    grown = max((12 + 3**1.5) * longest + 12 * widest, max(100, 500 * 6 * spec.dt) * widest, 32)
+    unit = 2.0 ** np.floor(np.log2(2**31 / grown))
+    if unit < _FINEST:
+        raise NeuralocksError(
+            f"model: its history of {longest:.0f} s, in bins of up to {widest:.0f} s, is too long for a header's numbers; "
+            "train it with shorter bins, as neuralocks rig train does"
+        )
     ends, half = np.round(unit * spec.dt * np.cumsum((0, *spec.bins))).astype(int), int(unit * spec.dt / 2)
     # Ends of the bins before the newest push: of gravity, of the turn and of velocity, which are read half a step apart.
     lags = np.concatenate([[0], ends[1:] - half, ends, ends + half])
@@ -126,7 +146,7 @@ def _history(spec: BoundarySpec) -> dict[str, str]:
     return {
         "BINS": str(len(spec.bins)),
         "ENTRIES": str(_ENTRIES),
-        "STEPS": str(spec.steps),
+        "REACH": f"{spec.steps * spec.dt:.3g}",
         "UNIT": _float(unit),
         "APART": str(int(unit * (spec.steps + 1) * spec.dt / (_ENTRIES - 2))),
         "LONGEST": _float(longest),

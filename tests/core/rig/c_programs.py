@@ -9,6 +9,22 @@ import pytest
 
 FLAGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-pedantic"]
 COMPILERS = [("gcc", "c", "c99"), ("g++", "c++", "c++11"), ("clang", "c", "c99"), ("clang++", "c++", "c++11")]
+HISTORY_HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  static nl_hair_history history;
+  static float row[8], out[6 * NL_HAIR_BINS];
+  const float down[3] = {0.0f, -1.0f, 0.0f};
+  nl_hair_history_reset(&history);
+  while (fread(row, sizeof row, 1, stdin) == 1) {
+    nl_hair_history_push(&history, (double)row[0], row + 1, row + 4);
+    nl_hair_history_read(&history, down, out);
+    fwrite(out, sizeof out, 1, stdout);
+  }
+  return 0;
+}
+"""
+"""Pushes and reads a history at each row: time [s], position, rotation."""
 
 
 def compiled(folder, source, options=("-O2",), compiler=("gcc", "c", "c99")):

@@ -10,23 +10,7 @@ from neuralocks_core.rig.export_c import HISTORY_BYTES, export_c
 from neuralocks_core.rotation import from_vector, to_quaternion
 from neuralocks_core.wind import Wind
 from tests.core.rig.builders import character, random_model
-from tests.core.rig.c_programs import COMPILERS, compiled, run_c
-
-HISTORY_HARNESS = """#include "hair.h"
-#include <stdio.h>
-int main(void) {
-  static nl_hair_history history;
-  static float row[8], out[6 * NL_HAIR_BINS];
-  const float down[3] = {0.0f, -1.0f, 0.0f};
-  nl_hair_history_reset(&history);
-  while (fread(row, sizeof row, 1, stdin) == 1) {
-    nl_hair_history_push(&history, (double)row[0], row + 1, row + 4);
-    nl_hair_history_read(&history, down, out);
-    fwrite(out, sizeof out, 1, stdout);
-  }
-  return 0;
-}
-"""
+from tests.core.rig.c_programs import COMPILERS, HISTORY_HARNESS, compiled, run_c
 
 
 @pytest.mark.parametrize("rate", [30, 60, 47, 144])
@@ -215,27 +199,6 @@ def test_nothing_adds_up_over_minutes(tmp_path):
     felt = run_c(compiled(tmp_path, LONG_HARNESS), [], 6 * len(rig_spec(True).bins))
     assert np.abs(felt[3]).max() > 0.1
     np.testing.assert_allclose(felt[3:], np.tile(felt[3], (597, 1)), atol=1e-4)
-
-
-@pytest.mark.parametrize("pause", [0.5, 1.5, 4, 7200])
-def test_of_a_pause_as_much_is_felt_as_the_history_reaches_back(tmp_path, pause):
-    """A swaying character is not updated for a while, and has moved on then: the means are those of the same integrals."""
-    spec = rig_spec(True)
-    export_c(random_model(spec=spec), tmp_path / "hair.h")
-    t = np.arange(120) / 60
-    t[60:] += pause
-    rows = np.zeros((len(t), 8), np.float32)
-    rows[:, 0], rows[:, 1], rows[:, 4] = t, 0.02 * np.sin(5 * t), 1
-    ours = run_c(compiled(tmp_path, HISTORY_HARNESS), rows, 6 * len(spec.bins)).reshape(len(t), -1, 6)
-    t = rows[:, 0].astype(float)
-    span = np.diff(t)
-    kicks = np.r_[0, np.cumsum(np.diff(np.diff(rows[:, 1].astype(float)) / span) / -9.81)]
-    for last in range(60, 90 if pause < 2 else 61):
-        when = t[last] - spec.dt * (np.r_[0, np.cumsum(spec.bins)] + 0.5)
-        sums = np.interp(when, t[1 : last + 1] - 0.5 * span[:last], kicks[:last])
-        wanted = spec.bin_weights * -np.diff(sums) / (spec.dt * np.array(spec.bins))
-        np.testing.assert_allclose(ours[last, :, 0], wanted, atol=1e-5)
-        assert np.abs(ours[last, :, 1:]).max() < 1e-5
 
 
 def test_a_report_gives_the_size_that_the_compiler_finds(tmp_path):

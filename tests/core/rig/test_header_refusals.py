@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Models of which no header is written."""
+
+from dataclasses import replace
+
+import pytest
+
+from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.rig import rig_spec
+from neuralocks_core.rig.export_c import export_c
+from tests.core.rig.builders import random_model
+
+
+def test_what_no_header_computes_is_refused(tmp_path):
+    model = random_model((4,) * 2, 8, 0, rig_spec(True))
+    with pytest.raises(NeuralocksError, match="other inputs than a header computes"):
+        export_c(replace(model, spec=replace(model.spec, linear="velocity")), tmp_path / "hair.h")
+    with pytest.raises(NeuralocksError, match="has no layers"):
+        replace(model, layers=())
+    with pytest.raises(NeuralocksError, match="too large to compute with"):
+        replace(model, layers=[(1e30 * weight, bias) for weight, bias in model.layers])
+
+
+def test_limits_that_the_header_does_not_keep_are_refused(tmp_path):
+    """It leaves the entries of rotations as they are, which are at most 1."""
+    model = random_model()
+    with pytest.raises(NeuralocksError, match=r"clamps entries of rotations to 0\.625, .*give it the limits of"):
+        export_c(replace(model, limits=0.5 * model.limits), tmp_path / "hair.h")
+    export_c(replace(model, limits=0.82 * model.limits), tmp_path / "hair.h")
