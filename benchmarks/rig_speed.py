@@ -7,8 +7,9 @@
 quasi-static one, which has no history, evaluate alone; spring bones move their tails on and turn the joints. Each character
 has its own state, and no two successive inputs are equal. A crowd is 1,000 characters in turn, whose states are in no cache of
 a core. Updates are 1/60 s apart, or up to a fifth more or less (*uneven*), which no branch predictor learns.
-C programs are built with gcc; times are the best of many short runs (a quarter of a million updates), so that other work on
-the machine counts little. In Python, *all* is the sampling of the clip as in a bake, and the network. It takes two or three minutes.
+C programs are built with gcc; times are the best of many short runs (a quarter of a million updates), so that other work on the
+machine counts little, but in a crowd it does: what it leaves of the cache decides how fast histories are read. In Python, *all*
+is the sampling of the clip as in a bake, and the network. It takes two or three minutes.
 """
 
 import argparse
