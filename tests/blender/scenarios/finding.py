@@ -2,6 +2,7 @@
 """The character and the hair that belong together, among others in the scene."""
 
 from pathlib import Path
+from unittest import SkipTest
 
 import bpy
 import numpy as np
@@ -64,6 +65,8 @@ def without_a_window(_folder: Path) -> None:
         assert bpy.context.scene.neuralocks.armature == other
         bpy.context.view_layer.objects.active = skin
         assert particles.choose(bpy.context)[0] == skin
+        if bpy.app.version < (4, 0):
+            raise SkipTest("this Blender converts nothing without a window")
         assert bpy.ops.neuralocks.from_particles() == {"FINISHED"}
     assert not particles.waiting(skin) and particles.waiting(plain)
 
