@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from neuralocks_core.body import surface_samples
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.surface_samples import SurfaceSamples, nearest
 from neuralocks_core.mesh import welded_vertices
@@ -58,3 +59,21 @@ def test_nothing_is_inside_beyond_an_open_edge():
     below, above = (np.array([[0.02, y, 0.01], [-0.03, y, 0.0]]) for y in (-0.1, 0.1))
     inside, over = (distances(samples, np.array(ball.vertices), some) for some in (below, above))
     assert (inside < 0).all() and (over > 1).all()
+
+
+def test_in_front_of_a_thin_part_is_hardly_ever_inside(monkeypatch):
+    """As of an ear: the faces around the nearest place may all be of its far side."""
+    thin = trimesh.creation.icosphere(4, 0.04)
+    vertices, triangles = np.array(thin.vertices) * [0.04, 1, 1], np.array(thin.faces)
+    rng = np.random.default_rng(0)
+    points = vertices[rng.integers(0, len(vertices), 4000)]
+    points += rng.uniform([0.005, -0.01, -0.01], [0.03, 0.01, 0.01], points.shape) * np.where(
+        points[:, :1] < 0, [-1, 1, 1], 1
+    )
+
+    def seem_inside() -> int:
+        return (distances(SurfaceSamples(vertices, triangles, 300), vertices, points) < 0).sum()
+
+    found = seem_inside()
+    monkeypatch.setattr(surface_samples, "WIDELY", surface_samples.AROUND)
+    assert found <= 2 and seem_inside() > 20
