@@ -20,7 +20,7 @@ TAB, LIVE = 130, 341
 """How far below the top of the sidebar the third tab and the Live button are."""
 TICK, AGAIN, PATIENCE = 0.4, 12.0, 60.0
 """Seconds from step to step, until a click is repeated, and until what should hold must hold."""
-state = {}
+state = {"tick": TICK}
 
 
 def build():
@@ -70,14 +70,15 @@ def mouse(below=None, click=False):
 
 def is_live():
     """The click on Live has reached the hair, and sampling runs in the background. On a busy machine, the panel may not have been drawn
-    yet when it came: then the tab and the button are clicked again.
+    yet when it came: then the tab and the button are clicked again, with twice as much time between.
     """
     live = bpy.data.objects["Hair"].neuralocks_hair.live
-    if not live and time.monotonic() - state["since"] > AGAIN and state.setdefault("clicks", 1) < 3:
-        state["clicks"] += 1
+    if not live and time.monotonic() - state["since"] > AGAIN and state["tick"] < 3:
+        state["tick"] *= 2
         STEPS[1:1] = [*CLICKS, is_live]
         return
     assert live, "the click on Live has not arrived"
+    state["tick"] = TICK
 
 
 def sampled():
@@ -162,13 +163,13 @@ def tick():
         STEPS[0]()
     except Exception as error:
         if isinstance(error, AssertionError) and time.monotonic() - since < PATIENCE:
-            return TICK
+            return state["tick"]
         traceback.print_exc()
         sys.stdout.flush()
         os._exit(1)
     del STEPS[0], state["since"]
     if STEPS:
-        return TICK
+        return state["tick"]
     print("all steps done", flush=True)
     os._exit(0)
 
