@@ -12,13 +12,19 @@ WELDED = 1e-4
 """Points this close [m] count as one: files split a skin along texture seams and between meshes."""
 
 
+def across(corners: np.ndarray) -> np.ndarray:
+    """Normals (n, 3), as long as twice the area, of triangles with corners (n, 3, 3); several times as fast as `numpy.cross`."""
+    x, y, z = np.moveaxis(corners, 2, 0)
+    (ux, vx), (uy, vy), (uz, vz) = ((c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in (x, y, z))
+    return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
+
+
 def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unit normals (V, 3) of points (V, 3), outward like the triangles (F, 3), by the right-hand rule.
 
     Each is the mean of the faces around, weighted by their area; zero if there is none.
     """
-    a, b, c = (np.asarray(points, float)[corner] for corner in triangles.T)
-    face, corners = np.cross(b - a, c - a), triangles.T.ravel()
+    face, corners = across(np.asarray(points, float)[triangles]), triangles.T.ravel()
     total = np.stack([np.bincount(corners, np.tile(part, 3), len(points)) for part in face.T], axis=1)
     return unit(total)
 

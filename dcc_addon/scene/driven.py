@@ -7,7 +7,7 @@ import bpy
 
 from .animated import is_muted
 from .recorded import number_of
-from .settings import as_set, settings_of
+from .rigging import shape_of
 
 _MEMBER = re.compile(r'(\w)\["((?:\\.|[^"\\])*)"\]')
 """A bone or the like in a path. Blender writes another name there if it gets one; custom properties are named without a word before."""
@@ -27,8 +27,8 @@ def number_of_drivers(mesh) -> int:
 def _driver(curve, paths: list[str]) -> list:
     driver = curve.driver
     driven = paths.index(curve.data_path) if curve.data_path in paths else -1
-    scaled = [as_set(each, settings_of(each)) for each in curve.modifiers]
-    return [driven, driver.type, driver.expression, driver.use_self, scaled, *map(_variable, driver.variables)]
+    of_curve = shape_of(curve)
+    return [driven, driver.type, driver.expression, driver.use_self, of_curve, *map(_variable, driver.variables)]
 
 
 def _variable(variable) -> list:

@@ -243,12 +243,12 @@ def _animated_by(data) -> list:
         if track.name not in HAIR or track.is_solo:
             found += [track.name, track.mute, track.is_solo]
     for strip in strips_of(data, HAIR):
-        found += [strip.name, *as_set(strip, settings_of(strip)), *(_keys(curve) for curve in strip.fcurves)]
+        found += [strip.name, *as_set(strip, settings_of(strip)), *(shape_of(curve) for curve in strip.fcurves)]
     for curve in data.drivers:
         if _of_hair(curve):
             continue
         driver = curve.driver
-        found += [curve.data_path, curve.array_index, curve.mute, _keys(curve), driver.type, driver.expression]
+        found += [curve.data_path, curve.array_index, curve.mute, shape_of(curve), driver.type, driver.expression]
         for variable in driver.variables:
             found += [variable.name, variable.type]
             found += [part for target in variable.targets for part in as_set(target, settings_of(target))]
@@ -261,7 +261,8 @@ def _of_hair(curve) -> bool:
     return isinstance(owner, bpy.types.Object) and owner.type == "CURVES" and curve.data_path.startswith("modifiers[")
 
 
-def _keys(curve) -> list:
+def shape_of(curve) -> list:
+    """Modifiers and keys of a curve, also of one that shapes what a driver gives."""
     modifiers = [[modifier.type, *as_set(modifier, settings_of(modifier))] for modifier in curve.modifiers]
     return [*modifiers, *((*key.co, key.interpolation) for key in curve.keyframe_points)]
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.mesh import connected_pieces, welded_vertices
+from neuralocks_core.mesh import across, connected_pieces, welded_vertices
 
 LARGEST = 0.25
 """A hole is closed if it is smaller than this share of its part's surface: an eyebrow or a ribbon is all rim."""
@@ -28,12 +28,12 @@ def closed_holes(points: np.ndarray, triangles: np.ndarray, head: np.ndarray) ->
     if not lids:
         return np.zeros((0, 3), int)
     piece = connected_pieces(place[triangles], len(points))[place]
-    room = np.bincount(piece[triangles[:, 0]], np.linalg.norm(_areas(points, triangles), axis=1), piece.max() + 1)
+    room = np.bincount(piece[triangles[:, 0]], np.linalg.norm(across(points[triangles]), axis=1), piece.max() + 1)
     every, firsts = np.concatenate(lids), np.cumsum([0] + [len(lid) for lid in lids[:-1]])
-    areas = _areas(points, every)
-    size, across = np.linalg.norm(areas, axis=1), np.add.reduceat(areas, firsts)
+    areas = across(points[every])
+    size, whole = np.linalg.norm(areas, axis=1), np.add.reduceat(areas, firsts)
     small = np.add.reduceat(size, firsts) < LARGEST * room[piece[every[firsts, 0]]]
-    kept = small & (across[:, 1] > DOWN * np.linalg.norm(across, axis=1))
+    kept = small & (whole[:, 1] > DOWN * np.linalg.norm(whole, axis=1))
     return every[np.repeat(kept, [len(lid) for lid in lids])]
 
 
@@ -60,9 +60,3 @@ def _lid(loop: np.ndarray) -> np.ndarray:
     strip = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
     strip[1::2] = strip[1::2, [1, 0, 2]]
     return strip
-
-
-def _areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Normals (F, 3) as long as the triangles' areas."""
-    a, b, c = points[triangles.T]
-    return np.cross(b - a, c - a) / 2

@@ -2,6 +2,7 @@
 """The body around the head of a rig with mesh hair: its poses, and distances of points from it."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -25,8 +26,9 @@ class BodyPatch:
     """
 
     @classmethod
+    @lru_cache(1)
     def of(cls, rig: HairRig, count: int) -> "BodyPatch | None":
-        """None if there is no body, or hair reaches none of its faces."""
+        """None if there is no body, or hair reaches none of its faces. A training asks several times for that of its rig."""
         near = _in_reach(rig)
         return None if near is None else cls(near, rig.character.head, count)
 

@@ -116,6 +116,7 @@ def drivers_told(_folder: Path) -> None:
         lambda: setattr(target, "data_path", 'pose.bones["head"].rotation_euler[1]'),
         lambda: setattr(curve.driver, "use_self", True),
         lambda: setattr(limits, "max_y", 2.0),
+        lambda: curve.keyframe_points.insert(1.0, 2.0),
         lambda: setattr(curve, "data_path", 'key_blocks["Held"].value'),
     ):
         edit()
