@@ -25,6 +25,10 @@ from neuralocks_core.rotation import from_quaternion, quaternion_product
 
 ITERATIONS = 3
 """Gauss-Newton steps per time step. With two, hair that flies into the body is still up to 2 mm deep in it."""
+SETTLE_DT, SETTLE_DAMPING = 1 / 60, 8.0
+"""Steps [s] and damping [1/s] before the motion begins, which bring hair half a metre long to rest the soonest."""
+AT_REST = 1e-6
+"""Hair is at rest when no bone's end moves by more than this in a step [m], nor did in the step before."""
 
 
 class ChainSolver:
@@ -75,7 +79,7 @@ class ChainSolver:
         wind: np.ndarray | None = None,
         *,
         substeps: int = 2,
-        warm_up: int = 60,
+        warm_up: int = 120,
     ):
         """Turns (C, T, N, 4) wxyz, canonical, of the joints.
 
@@ -85,43 +89,51 @@ class ChainSolver:
             body: the body to collide with.
             wind: acceleration of the hair at each sample, in world axes, (T, 3) [m/s^2]; it is linear between samples.
             substeps: integration steps per sample.
-            warm_up: steps at the first pose before the motion begins, so that it begins at rest.
+            warm_up: most steps of SETTLE_DT at the first pose before the motion begins, so that hair begins at rest relative to the
+                head, which has moved at constant velocity without turning.
         """
         heads = np.asarray(heads, float)
         clips, samples = heads.shape[:2]
-        h = step / substeps
         turns = np.zeros((clips, len(self.chains), 4))
         turns[..., 0] = 1
-        limit, near = self._limits(body), None
+        limit = self._limits(body)
         pull = GRAVITY * self.weight + (np.zeros((samples, 3)) if wind is None else wind)
         result = np.empty((clips, samples, len(self.chains), 4), np.float32)
         # by sample, then by clip
         bodies = None if body is None else np.swapaxes(body.vertices, 0, 1)
-        flown = None
         ways = [head_motion(head, substeps) for head in heads]
         facing = np.stack([Rotation.from_quat(way.turn).as_matrix() for way in ways])
         places = np.stack([way.origin for way in ways])
-        for sample in range(samples):
-            inner = warm_up + 1 if sample == 0 else substeps
-            for part in range(inner):
-                at = 0 if sample == 0 else (sample - 1) * substeps + part + 1
-                rotation, origin = facing[:, at], places[:, at]
-                ends = bone_ends(self.chains, *pose_chains(self.chains, from_quaternion(turns)))
-                world = np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None]
-                if sample == 0:  # settles without momentum
-                    flown = _Flown.at_rest(world, ends)
-                flight = np.einsum("cji,cmj->cmi", rotation, flown.free() - origin[:, None])
-                gravity = np.einsum("cji,j->ci", rotation, between(pull, at, substeps))
-                if body is not None and (sample > 0 or part == 0):
-                    near = NearestFaces(body.samples, between(bodies, at, substeps))
-                turns, ends = self._step(turns, flight, flown.carried(), gravity, h, near, limit)
-                flown = flown.then(np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None], ends)
+
+        def advanced(turns, flown, at, h, damping, near):
+            rotation, origin = facing[:, at], places[:, at]
+            flight = np.einsum("cji,cmj->cmi", rotation, flown.free() - origin[:, None])
+            gravity = np.einsum("cji,j->ci", rotation, between(pull, at, substeps))
+            turns, ends = self._step(turns, flight, flown.carried(), gravity, h, damping, near, limit)
+            return turns, flown.then(np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None], ends)
+
+        def surroundings(at):
+            return None if body is None else NearestFaces(body.samples, between(bodies, at, substeps))
+
+        ends = bone_ends(self.chains, *pose_chains(self.chains, from_quaternion(turns)))
+        world = np.einsum("cij,cmj->cmi", facing[:, 0], ends) + places[:, 0, None]
+        flown, near = _Flown.moving(world, ends, np.zeros((clips, 3))), surroundings(0)
+        for _ in range(warm_up):
+            turns, flown = advanced(turns, flown, 0, SETTLE_DT, SETTLE_DAMPING, near)
+            if np.abs([flown.speed, flown.speed_before]).max() < AT_REST:
+                break
+        drift = places[:, min(1, places.shape[1] - 1)] - places[:, 0]
+        flown = _Flown.moving(flown.last, flown.held, drift)
+        result[:, 0] = turns
+        for sample in range(1, samples):
+            for at in range((sample - 1) * substeps + 1, sample * substeps + 1):
+                turns, flown = advanced(turns, flown, at, step / substeps, self.damping, surroundings(at))
             result[:, sample] = turns
         return result
 
-    def _step(self, turns, flight, carried, gravity, h, near, limit):
+    def _step(self, turns, flight, carried, gravity, h, damping, near, limit):
         chains, tree = self.chains, self.tree
-        inertia, drag = 9 / (4 * h**2), 3 * self.damping / (2 * h)
+        inertia, drag = 9 / (4 * h**2), 3 * damping / (2 * h)
         planes = None
         for _ in range(ITERATIONS):
             matrices = from_quaternion(turns)
@@ -236,9 +248,10 @@ class _Flown:
     speed_before: np.ndarray
 
     @classmethod
-    def at_rest(cls, world, held):
-        still = np.zeros_like(world)
-        return cls(world, world, held, held, still, still)
+    def moving(cls, world, held, drift):
+        """With the velocities (C, 3) [m per step] of heads that do not turn, at rest relative to them."""
+        drift = np.broadcast_to(drift[:, None], world.shape)
+        return cls(world, world - drift, held, held, drift, drift)
 
     def free(self):
         """Where the ends would be after a step without forces, in the world."""

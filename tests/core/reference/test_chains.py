@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.rig import find_chains
+from neuralocks_core.rig.kinematics import bone_ends, pose_chains
 from neuralocks_core.rig.rods import RigMaterial, RodTree
+from neuralocks_core.rotation import from_quaternion
 from tests.core.rig.builders import character, tail
 
 BONE, RATE = 0.05, 120
@@ -30,9 +32,9 @@ def test_a_chain_swings_in_its_own_modes(bend):
     hung = 9.81 * BONE * np.diag(np.cumsum(tree.mass[::-1])[::-1])
     squares, shapes = eigh(hung + turn.T @ np.diag(tree.stiffness) @ turn, mass)
     heads = np.tile(np.eye(4), (1, 150, 1, 1))
-    heads[0, 1:, 0, 3] = 0.01  # a sudden step aside sets it going
+    heads[0, 2:, 0, 3] = 0.01  # a sudden step aside sets it going
     turns = ChainSolver(chains, tree, 0.0).simulate(heads, 1 / RATE, substeps=4, warm_up=2)[0]
-    angles = np.cumsum(2 * np.arcsin(turns[2:, :, 3].astype(float)), axis=1)
+    angles = np.cumsum(2 * np.arcsin(turns[3:, :, 3].astype(float)), axis=1)
     for mode in (0, 1):
         swing = angles @ mass @ shapes[:, mode]
         cross = np.flatnonzero(np.diff(np.sign(swing)))
@@ -76,14 +78,50 @@ def test_error_falls_with_the_square_of_the_step():
 def test_only_damping_slows_a_chain():
     """A pendulum of one bone loses exp(-c t / 2) of its swing and next to nothing by steps of 1/60 s."""
     chains, damping = chain((0, -0.3, 0), 1), 2.0
-    heads = np.tile(np.eye(4), (1, 91, 1, 1))
-    heads[0, 1:, 0, 3] = 0.01
+    heads = np.tile(np.eye(4), (1, 92, 1, 1))
+    heads[0, 2:, 0, 3] = 0.01
     sizes = []
     for c in (0.0, damping):
         turns = ChainSolver(chains, RodTree(chains, RigMaterial(bend=1e-9)), c).simulate(heads, 1 / 30, warm_up=2)
         angle = np.abs(2 * np.arcsin(turns[0, :, 0, 3].astype(float)))
-        sizes.append([angle[2:32].max(), angle[61:].max()])
+        sizes.append([angle[3:33].max(), angle[62:].max()])
     bare, damped = np.array(sizes)
     assert bare[1] / bare[0] > 0.97
     peaks = 59 / 30  # s between the two windows' peaks, within a swing
     assert np.log(damped[0] / damped[1]) == pytest.approx(damping / 2 * peaks, rel=0.15)
+
+
+@pytest.mark.parametrize("rate", [30, 120])
+def test_hair_of_a_tilted_head_begins_where_it_hangs(rate):
+    """Long and soft hair on a head that is bowed from the first sample on: it neither falls nor swings, at any rate of samples."""
+    chains = chain((0, -0.06, 0), 8)
+    heads = np.tile(np.eye(4), (1, rate // 2, 1, 1))
+    heads[0, :, :3, :3] = Rotation.from_rotvec([0.6, 0, 0]).as_matrix()
+    turns = ChainSolver(chains, RodTree(chains, RigMaterial()), 6.0).simulate(heads, 1 / rate)[0]
+    ends = bone_ends(chains, *pose_chains(chains, from_quaternion(turns.astype(float))))
+    assert np.linalg.norm(ends[0, -1] - chains.origins[0] - [0, -0.48, 0]) > 0.2
+    assert np.abs(ends - ends[-1]).max() < 5e-4
+
+
+def test_hair_of_a_head_that_comes_along_flies_with_it():
+    """Before the first sample, the head moves as between the first two: at constant velocity nothing happens."""
+    chains = chain((0, -BONE, 0.5 * BONE))
+    heads = np.tile(np.eye(4), (1, 30, 1, 1))
+    heads[0, :, :3, 3] = np.outer(np.arange(30) / 30, [0.5, 0.2, 3.0])
+    turns = ChainSolver(chains, RodTree(chains, RigMaterial()), 6.0).simulate(heads, 1 / 30)
+    assert np.abs(turns[..., 1:]).max() < 1e-6
+
+
+def test_a_bone_whirls_as_a_conical_pendulum_does():
+    """A limp bone beside the axis about which its head turns steadily: tan a = w^2 (r + L sin a) / g."""
+    radius, length, spin = 0.1, 0.3, 4.0
+    chains = find_chains(character(tail(joints=2, at=(radius, 1.6, 0), step=(0, -length, 0))))
+    out = chains.origins[0, 0]  # the canonical origin is the head joint, on the axis
+    heads = np.tile(np.eye(4), (1, 240, 1, 1))
+    heads[0, :, :3, :3] = Rotation.from_rotvec(np.outer(spin * np.arange(240) / 40, [0, 1, 0])).as_matrix()
+    turns = ChainSolver(chains, RodTree(chains, RigMaterial(bend=1e-9)), 6.0).simulate(heads, 1 / 40)[0, -1]
+    end = bone_ends(chains, *pose_chains(chains, from_quaternion(turns[None].astype(float))))[0, 0]
+    hung = end - chains.origins[0]
+    angle = np.arctan2(np.hypot(hung[0], hung[2]), -hung[1])
+    assert np.tan(angle) == pytest.approx(spin**2 * (out + length * np.sin(angle)) / 9.81, rel=0.01)
+    assert hung[2] == pytest.approx(0.0, abs=1e-3)  # neither ahead of the head nor behind it

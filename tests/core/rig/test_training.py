@@ -100,9 +100,9 @@ def test_a_loose_tail_swings_as_a_pendulum():
     solver = ChainSolver(chains, RodTree(chains, material), 0.0)
     rate = 120
     heads = np.tile(np.eye(4), (1, 3 * rate, 1, 1))
-    heads[0, 1:, 0, 3] = 0.03  # a sudden step aside sets it going
+    heads[0, 2:, 0, 3] = 0.03  # a sudden step aside sets it going
     turns = solver.simulate(heads, 1 / rate, substeps=2, warm_up=2)
-    angle = 2 * turns[0, 2:, 0, 3]
+    angle = 2 * turns[0, 3:, 0, 3]
     crossings = np.flatnonzero(np.diff(np.sign(angle)) != 0)
     period = 2 * np.diff(crossings).mean() / rate
     assert period == pytest.approx(2 * np.pi * np.sqrt(0.3 / 9.81), rel=0.05)
