@@ -5,12 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neuralocks_core.body.surface_samples import SurfaceSamples, nearest
+from neuralocks_core.body.surface_samples import NEAR, SurfaceSamples, nearest
+from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.rig.chains import HairChains
 
 CORNERS, MORE, APART = 8, 32, 0.02
 """Points of each joint's mesh that collide with the body: the corners, and up to MORE where one is farther than APART [m] from all
 others, as on large locks. With only spheres at the ends and middles of the bones, the mesh was up to 24 mm deep in the body."""
+ROOM, ROUGH = 0.01, 0.02
+"""[m] What a contact may move in a step beyond its flight. How exactly distances beyond NEAR are known, where only one face is looked
+at."""
 BONE_RADIUS = 0.012
 """[m] kept from the body by the bones of hair without a mesh."""
 
@@ -73,20 +77,51 @@ class Contacts:
 
 
 class NearestFaces:
-    """The bodies of one step, vertices (C, V, 3) of a mesh with such samples."""
+    """The planes of bodies in motion, one of each clip, near contacts that move, too.
 
-    def __init__(self, samples: SurfaceSamples, vertices: np.ndarray):
-        self.samples, self.vertices = samples, vertices
-        self._index = [samples.index(body) for body in vertices]
+    Finding them is half of a simulation's time, and few contacts are near. A contact whose distance was known cannot have come
+    nearer than by what it and the body have moved since.
 
-    def planes(self, where):
+    Args:
+        samples: places on the faces of all of the bodies.
+    """
+
+    def __init__(self, samples: SurfaceSamples):
+        self.samples, self._bodies, self._index = samples, None, []
+        self._clear, self._places = None, None
+
+    def move(self, bodies: np.ndarray) -> None:
+        """The bodies' vertices (C, V, 3) [m] of the next step."""
+        if self._clear is not None:
+            self._clear -= np.sqrt(np.square(bodies - self._bodies).sum(axis=2).max(axis=1))[:, None]
+        self._bodies, self._index = bodies, [None] * len(bodies)
+
+    def planes(self, where: np.ndarray, reach=np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Plane n.x = d through the place of the body nearest to each of `where` (C, Q, 3), across the way there: normals n
-        (C, Q, 3) and offsets d (C, Q).
+        (C, Q, 3) and offsets d (C, Q). Of contacts that cannot be nearer than `reach` (C, Q) [m] and ROOM, it is one that
+        everything is outside of.
         """
-        found = np.concatenate([nearest(index, points) for index, points in zip(self._index, where)])
-        clip = np.repeat(np.arange(len(where)), where.shape[1])
-        normals, offsets = self.samples.planes(found, where.reshape(-1, 3), self.vertices, clip)
-        return normals.reshape(where.shape), offsets.reshape(where.shape[:2])
+        if self._clear is None:
+            self._clear = np.full(where.shape[:2], -np.inf)
+        else:
+            self._clear -= np.linalg.norm(where - self._places, axis=2)
+        self._places = where
+        normals, offsets = np.zeros(where.shape), np.full(where.shape[:2], NO_PLANE[3])
+        clip, contact = np.nonzero(self._clear < reach + ROOM)
+        if not len(clip):
+            return normals, offsets
+        found = [self._nearest(row, where[row, contact[clip == row]]) for row in np.unique(clip)]
+        near = self.samples.planes(np.concatenate(found), where[clip, contact], self._bodies, clip)
+        normals[clip, contact], offsets[clip, contact] = near
+        distance = np.einsum("ni,ni->n", near[0], where[clip, contact]) - near[1]
+        known = np.where(distance < NEAR, distance, np.maximum(NEAR, distance - ROUGH))
+        self._clear[clip, contact] = np.where(near[1] == NO_PLANE[3], -np.inf, known)
+        return normals, offsets
+
+    def _nearest(self, clip: int, points: np.ndarray) -> np.ndarray:
+        if self._index[clip] is None:
+            self._index[clip] = self.samples.index(self._bodies[clip])
+        return nearest(self._index[clip], points)
 
 
 def _far_apart(points: np.ndarray) -> list[np.ndarray]:

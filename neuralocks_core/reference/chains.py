@@ -25,9 +25,9 @@ from neuralocks_core.rotation import from_quaternion, quaternion_product
 
 ITERATIONS = 3
 """Gauss-Newton steps per time step. With two, hair that flies into the body is still up to 2 mm deep in it."""
-SETTLE_DT, SETTLE_DAMPING = 1 / 60, 8.0
+SETTLE_DT, SETTLE_DAMPING = 1 / 20, 8.0
 """Steps [s] and damping [1/s] before the motion begins, which bring hair half a metre long to rest the soonest."""
-AT_REST = 1e-6
+AT_REST = 1e-5
 """Hair is at rest when no bone's end moves by more than this in a step [m], nor did in the step before."""
 
 
@@ -79,7 +79,7 @@ class ChainSolver:
         wind: np.ndarray | None = None,
         *,
         substeps: int = 2,
-        warm_up: int = 120,
+        warm_up: int = 40,
     ):
         """Turns (C, T, N, 4) wxyz, canonical, of the joints.
 
@@ -96,7 +96,7 @@ class ChainSolver:
         clips, samples = heads.shape[:2]
         turns = np.zeros((clips, len(self.chains), 4))
         turns[..., 0] = 1
-        limit = self._limits(body)
+        limit, near = self._limits(body), None if body is None else NearestFaces(body.samples)
         pull = GRAVITY * self.weight + (np.zeros((samples, 3)) if wind is None else wind)
         result = np.empty((clips, samples, len(self.chains), 4), np.float32)
         # by sample, then by clip
@@ -105,21 +105,23 @@ class ChainSolver:
         facing = np.stack([Rotation.from_quat(way.turn).as_matrix() for way in ways])
         places = np.stack([way.origin for way in ways])
 
-        def advanced(turns, flown, at, h, damping, near):
+        def advanced(turns, flown, at, h, damping):
             rotation, origin = facing[:, at], places[:, at]
             flight = np.einsum("cji,cmj->cmi", rotation, flown.free() - origin[:, None])
             gravity = np.einsum("cji,j->ci", rotation, between(pull, at, substeps))
             turns, ends = self._step(turns, flight, flown.carried(), gravity, h, damping, near, limit)
             return turns, flown.then(np.einsum("cij,cmj->cmi", rotation, ends) + origin[:, None], ends)
 
-        def surroundings(at):
-            return None if body is None else NearestFaces(body.samples, between(bodies, at, substeps))
+        def meet(at):
+            if near is not None:
+                near.move(between(bodies, at, substeps))
 
         ends = bone_ends(self.chains, *pose_chains(self.chains, from_quaternion(turns)))
         world = np.einsum("cij,cmj->cmi", facing[:, 0], ends) + places[:, 0, None]
-        flown, near = _Flown.moving(world, ends, np.zeros((clips, 3))), surroundings(0)
+        flown = _Flown.moving(world, ends, np.zeros((clips, 3)))
+        meet(0)
         for _ in range(warm_up):
-            turns, flown = advanced(turns, flown, 0, SETTLE_DT, SETTLE_DAMPING, near)
+            turns, flown = advanced(turns, flown, 0, SETTLE_DT, SETTLE_DAMPING)
             if np.abs([flown.speed, flown.speed_before]).max() < AT_REST:
                 break
         drift = places[:, min(1, places.shape[1] - 1)] - places[:, 0]
@@ -127,7 +129,8 @@ class ChainSolver:
         result[:, 0] = turns
         for sample in range(1, samples):
             for at in range((sample - 1) * substeps + 1, sample * substeps + 1):
-                turns, flown = advanced(turns, flown, at, step / substeps, self.damping, surroundings(at))
+                meet(at)
+                turns, flown = advanced(turns, flown, at, step / substeps, self.damping)
             result[:, sample] = turns
         return result
 
@@ -147,7 +150,8 @@ class ChainSolver:
             stiff = tree.mass * (inertia + drag)
             if near is not None:
                 touching = self._touching(rotations, positions)
-                planes = near.planes(touching) if planes is None else planes
+                if planes is None:
+                    planes = near.planes(touching, limit + self._flown_by(ends, flight))
                 depth = np.maximum(0, limit + planes[1] - np.einsum("cqi,cqi->cq", planes[0], touching))
             w, v = turns[..., :1], turns[..., 1:]
             # d/dw of 2 k |v|^2 for a turn w applied from the left, in the carrier's axes.
@@ -187,8 +191,16 @@ class ChainSolver:
         """Distance that each contact keeps: its radius, or its distance at rest if that is less."""
         if body is None:
             return None
-        normals, offsets = NearestFaces(body.samples, body.rest[None]).planes(self.contacts.points[None])
+        still = NearestFaces(body.samples)
+        still.move(body.rest[None])
+        normals, offsets = still.planes(self.contacts.points[None])
         return np.minimum(self.contacts.radius, np.einsum("qi,qi->q", normals[0], self.contacts.points) - offsets[0])
+
+    def _flown_by(self, ends, flight):
+        """How far the fastest bone of each contact's chain would fly in a step, (C, Q) [m], from ends (C, M, 3)."""
+        farthest = np.zeros((len(self.chains.roots), len(ends)))
+        np.maximum.at(farthest, self.chains.chain[self.chains.bone_joint], np.linalg.norm(flight - ends, axis=2).T)
+        return farthest[self.chains.chain[self.contacts.joint]].T
 
     def _touching(self, rotations, positions):
         """Where the contacts are, (C, Q, 3)."""
