@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bodies in poses or in motion to learn from, renewed continually, and the loss of hair that collides with them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 
@@ -10,7 +8,7 @@ from neuralocks_core.rig.network import POSE, feature_columns
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.rig.energy import RigEnergy
-from neuralocks_core.training.rig.poses import PosePool
+from neuralocks_core.training.rig.poses import Moments, PosePool
 
 COLLIDING = 96
 """Hair vertices that collide in one step, drawn again in each: finding the nearest body is half of a step's time."""
@@ -30,19 +28,6 @@ it is luck: one seed in four never comes near the others' energy."""
 def contact_weight(done: float) -> float:
     """Share of the contact weight when a share `done` of the budget is used."""
     return GENTLE ** max(0.0, 1.0 - done / GROWING)
-
-
-@dataclass(frozen=True)
-class Moments:
-    """Moments of bodies in motion.
-
-    Attributes:
-        features: the network's inputs in each, (M, F) float32.
-        skinning: posed @ inverse(bind) of every joint, (M, J, 4, 4).
-    """
-
-    features: np.ndarray
-    skinning: np.ndarray
 
 
 class HairOnBodies:
@@ -66,9 +51,9 @@ class HairOnBodies:
         spec,
         moments: Moments | None = None,
     ):
-        self.pool = PosePool(rig, count, rng, moving=None if moments is None else moments.skinning)
+        self.pool = PosePool(rig, count, rng, moments)
         self.energy = RigEnergy(rig, material)
-        self._rng, self._spec, self._moments, self._taken = rng, spec, moments, 0
+        self._rng, self._spec, self._taken = rng, spec, 0
         # Body, features, and collision energy at its last use.
         self._hard = (np.zeros(0, int), np.zeros((0, len(feature_columns(spec))), np.float32), np.zeros(0, np.float32))
 
@@ -88,18 +73,13 @@ class HairOnBodies:
         chosen = self._rng.permutation(known)[: batch // 2]
         fresh = self._rng.integers(0, self.pool.count, batch - len(chosen))
         bodies = np.concatenate([self._hard[0][chosen], fresh])
-        features = np.concatenate([self._hard[1][chosen], self._features(fresh)])
-        gravity = features[:, POSE - 3 : POSE]
+        features = np.concatenate([self._hard[1][chosen], self.pool.situations(self._spec, fresh)])
         turns = net(torch.as_tensor(features))
-        parts = self.energy.parts(self.pool, bodies, turns, gravity, self.energy.draw(self._rng, COLLIDING))
+        some = self.energy.draw(self._rng, COLLIDING)
+        parts = self.energy.parts(self.pool, bodies, turns, features[:, POSE - 3 : POSE], some)
         left = np.delete(np.arange(known), chosen)
         met = (bodies, features, parts[1].detach().numpy())
         every = tuple(np.concatenate([old[left], new]) for old, new in zip(self._hard, met))
         hardest = np.argsort(-every[2], kind="stable")[:HARD]
         self._hard = tuple(part[hardest] for part in every)
         return parts[0][batch // 2 :], parts[1]
-
-    def _features(self, bodies: np.ndarray) -> np.ndarray:
-        if self._moments is not None:
-            return self._moments.features[self.pool.moment[bodies]]
-        return self.pool.features(self._spec, bodies, self.pool.gravity(bodies))

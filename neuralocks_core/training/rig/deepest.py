@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The held poses in which hair lies deepest in the body, searched among thousands while a network learns."""
+"""The situations in which hair lies deepest in the body, searched among thousands while a network learns."""
 
 import numpy as np
 import torch
 
-from neuralocks_core.rig.network import feature_columns
+from neuralocks_core.rig.network import POSE, feature_columns
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.rig.energy import RigEnergy
-from neuralocks_core.training.rig.poses import PosePool
+from neuralocks_core.training.rig.poses import Moments, PosePool
 
 SEARCHED, KEPT = 2048, 128
 """Poses that are searched, and those of them that are learned from until the next search."""
@@ -21,7 +21,7 @@ _TOGETHER = 64
 
 
 class DeepestPoses:
-    """Held poses and bodies, and the contact of hair in the worst of them.
+    """Poses and bodies, and the contact of hair in the worst of them.
 
     Where hair lies in the body, one pose in hundreds is the deepest, and the poses of a training step hold none like it.
 
@@ -30,13 +30,21 @@ class DeepestPoses:
         material: constants of the contact.
         rng: decides poses and bodies.
         spec: the network's inputs.
+        moments: of motion to draw the poses from; held poses of random necks if left out.
         searched: number of poses.
     """
 
-    def __init__(self, rig: HairRig, material: RigMaterial, rng: np.random.Generator, spec, searched: int = SEARCHED):
-        self._pool, self._energy = PosePool(rig, searched, rng), RigEnergy(rig, material)
+    def __init__(
+        self,
+        rig: HairRig,
+        material: RigMaterial,
+        rng: np.random.Generator,
+        spec,
+        moments: Moments | None = None,
+        searched: int = SEARCHED,
+    ):
+        self._pool, self._energy = PosePool(rig, searched, rng, moments), RigEnergy(rig, material)
         self._rng, self._spec, self._taken = rng, spec, 0
-        self._gravity = np.empty((searched, 3))
         self._features = np.empty((searched, len(feature_columns(spec))), np.float32)
         self._read(np.arange(searched))
 
@@ -46,7 +54,7 @@ class DeepestPoses:
             self._search(net)
         self._taken += 1
         rows = self._rng.choice(self._worst, min(batch, len(self._worst)), replace=False)
-        return self._energy.parts(self._pool, rows, self._turns(net, rows), self._gravity[rows])[1]
+        return self._energy.parts(self._pool, rows, self._turns(net, rows), self._features[rows, POSE - 3 : POSE])[1]
 
     @torch.no_grad()
     def _search(self, net) -> None:
@@ -61,5 +69,4 @@ class DeepestPoses:
         return net(torch.as_tensor(self._features[rows]))
 
     def _read(self, rows: np.ndarray) -> None:
-        self._gravity[rows] = self._pool.gravity(rows)
-        self._features[rows] = self._pool.features(self._spec, rows, self._gravity[rows])
+        self._features[rows] = self._pool.situations(self._spec, rows)

@@ -17,12 +17,13 @@ from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Descended
-from neuralocks_core.training.rig.contact import HairOnBodies, Moments, contact_weight
+from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
 from neuralocks_core.training.rig.deepest import LATE, DeepestPoses
 from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.learning import trained
 from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_motions
 from neuralocks_core.training.rig.network import TinyNet
+from neuralocks_core.training.rig.poses import Moments
 from neuralocks_core.training.rig.report import static_report
 from neuralocks_core.training.rollouts import STOPS
 from neuralocks_core.training.threads import threads
@@ -37,8 +38,9 @@ to squared errors [m^2]. Clips hold few of the poses that necks can take; energy
 _DEEP = 3.0
 """Contact in a held pose counts by its logarithm beyond this energy [m^2/s^2]: otherwise the few poses in which a lock would be
 deepest outweigh all those in which it would hang, and it stands out from the head in all of them."""
-_DEEPEST, _DEEPEST_ROOM = 2e-4, 0.012
-"""Weight of contact in the poses in which hair lies deepest, and the room kept there [m]."""
+_DEEPEST, _DEEPEST_MOVING = 2e-4, 4e-5
+"""Weights of contact in the held poses and in the moments of motion in which hair lies deepest. As much in motion as in held poses
+costs a tenth of the motion."""
 _POOL = 256
 """Number of bodies held ready, and as many in motion."""
 _HELD, _MOVING, _WORST = 16, 8, 8
@@ -99,7 +101,9 @@ def train_dynamic(
     say(simulated, 1000, "posing bodies")
     held = HairOnBodies(rig, _roomy(material, _HELD_ROOM), _POOL, rng, spec)
     moving = HairOnBodies(rig, _roomy(material, _ROOM), _POOL, rng, spec, moments)
-    deepest = DeepestPoses(rig, _roomy(material, _DEEPEST_ROOM), *rng.spawn(1), spec) if held.pool.collides else None
+    if held.pool.collides:
+        deepest = DeepestPoses(rig, _roomy(material, _HELD_ROOM), *rng.spawn(1), spec)
+        deepest_moving = DeepestPoses(rig, _roomy(material, _ROOM), *rng.spawn(1), spec, moments)
     inputs, wanted = torch.as_tensor(features), torch.as_tensor(turns)
     net = TinyNet(begin.hidden if begin else hidden, held.pool, spec)
     net.normalise(features.reshape(-1, features.shape[-1]))
@@ -124,6 +128,7 @@ def train_dynamic(
             result["moving"] = felt * _COLLISION * moving.parts(net, _MOVING)[1].mean()
             if stage >= LATE:
                 result["deepest"] = _DEEPEST * _bounded(deepest.contact(net, _WORST)).mean()
+                result["deepest moving"] = _DEEPEST_MOVING * deepest_moving.contact(net, _WORST).mean()
         return result
 
     def show(state: Descended) -> None:

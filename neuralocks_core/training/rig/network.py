@@ -24,7 +24,7 @@ class TinyNet(torch.nn.Module):
         super().__init__()
         self.hidden, self.joints, self.spec = hidden, len(pool.rig.chains), spec
         sample = np.arange(min(pool.count, 512))
-        features = pool.features(spec, sample, pool.gravity(sample))
+        features = pool.situations(spec, sample)
         self.register_buffer("mean", torch.as_tensor(features.mean(0)))
         self.register_buffer("scale", torch.as_tensor(1 / np.maximum(features.std(0), 0.05)))
         still = held_features(spec, np.tile(np.eye(3), (1, 2, 1, 1)), np.array([[0.0, -1.0, 0.0]]))

@@ -2,6 +2,7 @@
 """Random neck poses and body shapes for rigged mesh hair, with what is near of the body around the head of each (paper section 4.4)."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +21,19 @@ _SIEVE = 5e-3
 """Points farther than this [m] outside the plane of the nearest place of the body are not measured exactly."""
 
 
+@dataclass(frozen=True)
+class Moments:
+    """Moments of bodies in motion.
+
+    Attributes:
+        features: the network's inputs in each, (M, F) float32.
+        skinning: posed @ inverse(bind) of every joint, (M, J, 4, 4).
+    """
+
+    features: np.ndarray
+    skinning: np.ndarray
+
+
 class PosePool:
     """Posed bodies to draw from; renewed bit by bit, so that no network memorises their shapes.
 
@@ -27,8 +41,7 @@ class PosePool:
         rig: hair and body.
         count: number of poses held at a time.
         rng: decides all of them.
-        moving: moments of motion to draw the poses from, posed @ inverse(bind) of every joint, (M, J, 4, 4); random
-            necks if left out.
+        moments: of motion to draw the poses from; random necks if left out.
 
     Attributes:
         moment: the index of each pose's moment, (P,).
@@ -41,9 +54,9 @@ class PosePool:
         rig: HairRig,
         count: int,
         rng: np.random.Generator,
-        moving: np.ndarray | None = None,
+        moments: Moments | None = None,
     ):
-        self.rig, self.count, self._rng, self._oldest, self._moving = rig, count, rng, 0, moving
+        self.rig, self.count, self._rng, self._oldest, self._moments = rig, count, rng, 0, moments
         self.moment = np.zeros(count, int)
         self.relative = np.empty((count, 2, 3, 3))
         self._patch = BodyPatch.of(rig, KEPT) if len(rig.points) else None
@@ -66,11 +79,11 @@ class PosePool:
         character = self.rig.character
         rows = (self._oldest + np.arange(count)) % self.count
         self._oldest = (self._oldest + count) % self.count
-        if self._moving is None:
+        if self._moments is None:
             skinning = _random_skinning(character, count, self._rng)
         else:
-            self.moment[rows] = self._rng.integers(0, len(self._moving), count)
-            skinning = self._moving[self.moment[rows]]
+            self.moment[rows] = self._rng.integers(0, len(self._moments.skinning), count)
+            skinning = self._moments.skinning[self.moment[rows]]
         facing, head = character.facing, character.head
         indices = [character.humanoid.nearest(name) for name in ("neck", "upper_chest")]
         turns = np.swapaxes(skinning[:, None, head, :3, :3], -1, -2) @ skinning[:, indices, :3, :3]
@@ -102,6 +115,12 @@ class PosePool:
         axis = np.stack([np.cos(around), 0 * around, np.sin(around)], axis=1)
         trunk = np.einsum("nji,j->ni", from_vector(axis * lean[:, None]), [0.0, -1.0, 0.0])
         return np.einsum("nij,nj->ni", self.relative[poses, 1], trunk)
+
+    def situations(self, spec, poses: np.ndarray) -> np.ndarray:
+        """The network's inputs at these poses' moments, or in the held poses under a random gravity, (n, F) float32."""
+        if self._moments is not None:
+            return self._moments.features[self.moment[poses]]
+        return self.features(spec, poses, self.gravity(poses))
 
     def features(self, spec, poses: np.ndarray, gravity: np.ndarray) -> np.ndarray:
         """The network's inputs for these poses, (n, F) float32."""

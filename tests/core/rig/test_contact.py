@@ -25,10 +25,10 @@ from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig import deepest
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig.body import BodyPatch, rest_distances
-from neuralocks_core.training.rig.contact import HairOnBodies, Moments
+from neuralocks_core.training.rig.contact import HairOnBodies
 from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.motion import simulate_motions
-from neuralocks_core.training.rig.poses import PosePool
+from neuralocks_core.training.rig.poses import Moments, PosePool, _random_skinning
 from neuralocks_core.training.rig.report import hair_points, no_turns
 from neuralocks_core.training.rig.static import train_static
 from tests.core.rig.builders import character, tail
@@ -185,22 +185,34 @@ def test_hair_comes_back_to_where_it_lay_deepest(monkeypatch):
     assert costs[:, :4].mean() > 1.3 * costs[:, 4:].mean() > 0
 
 
-def test_the_deepest_of_many_poses_are_learned_from(monkeypatch):
-    """Of all that are searched, those in which a vertex is deepest, again after some are replaced."""
+@pytest.mark.parametrize("moving", [False, True], ids=["held", "in motion"])
+def test_the_deepest_of_many_poses_are_learned_from(monkeypatch, moving):
+    """Of all that are searched, those in which a vertex is deepest, again after some are replaced; in motion with what the network
+    reads at that moment.
+    """
     monkeypatch.setattr(deepest, "KEPT", 8)
     monkeypatch.setattr(deepest, "EVERY", 2)
     monkeypatch.setattr(deepest, "RENEWED", 32)
-    rig = cap_over_a_chest()
-    poses = deepest.DeepestPoses(rig, RigMaterial(), np.random.default_rng(0), rig_spec(), searched=64)
+    rig, rng = cap_over_a_chest(), np.random.default_rng(0)
+    read = rng.normal(size=(40, len(feature_columns(rig_spec())))).astype(np.float32)
+    moments = Moments(read, _random_skinning(rig.character, len(read), rng)) if moving else None
+    poses = deepest.DeepestPoses(rig, RigMaterial(), rng, rig_spec(), moments, searched=64)
     energy, pool, rows = RigEnergy(rig, RigMaterial()), poses._pool, np.arange(64)
-    before = None
+    before, asked = None, []
+
+    def answer(features):
+        asked.append(features.numpy())
+        return still(rig, features)
+
     for _ in range(3):
-        costs = [poses.contact(partial(still, rig), 8).sort().values for _ in range(2)]
+        costs = [poses.contact(answer, 8).sort().values for _ in range(2)]
         depth = energy.depths(pool, rows, still(rig, rows))
         assert 0 < (depth > 0).sum() < 64 and (before is None or 0 < (before != depth).sum() <= 32)
         worst = np.argsort(-depth)[:8]
         wanted = energy.parts(pool, worst, still(rig, worst), np.zeros((8, 3)))[1].sort().values
         assert torch.equal(costs[0], wanted) and torch.equal(costs[1], wanted)
+        if moving:
+            assert set(map(bytes, asked[-1])) == set(map(bytes, read[pool.moment[worst]]))
         before = depth
 
 
