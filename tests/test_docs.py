@@ -4,9 +4,11 @@ options.
 """
 
 import ast
+import json
 import re
 from functools import cache
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 
@@ -236,3 +238,16 @@ def test_every_file_is_under_the_licence_that_the_credits_state():
         licence = "GPL-3.0-or-later" if blender else "Apache-2.0"
         if text := path.read_text("utf-8"):
             assert f"SPDX-License-Identifier: {licence}\n" in text[:100] and licence in credits, path
+
+
+def test_the_credits_name_each_model_that_learned_from_hair_of_others():
+    learned = []
+    for path in sorted((ROOT / "neuralocks_core/shipped").glob("strands*.neuralocks")):
+        with ZipFile(path) as model:
+            card = json.loads(model.read("model.json"))
+        if any("TressFX" in credit for credit in card["credits"]):
+            learned.append("all styles" if path.stem == "strands" else f"{path.stem.removeprefix('strands_')} hair")
+    told = re.search(
+        r"those for (.+) also on the ponytail", " ".join((ROOT / "CREDITS.md").read_text("utf-8").split())
+    )[1]
+    assert told.split(" and for ") == learned
