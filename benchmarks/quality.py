@@ -258,7 +258,7 @@ def table(rows: list[dict], by: str) -> None:
     groups = defaultdict(list)
     for row in rows:
         groups[row[by]].append(row)
-    names = [n for n in rows[0] if n not in ("kind", "style")]
+    names = [n for n in dict.fromkeys(n for row in rows for n in row) if n not in ("kind", "style")]
     print(f"\n| {by} | " + " | ".join(names) + " |\n| --- |" + " ---: |" * len(names))
     for key, group in [*groups.items(), ("all", rows)]:
         known = ([row[n] for row in group if not np.isnan(row.get(n, np.nan))] for n in names)

@@ -94,3 +94,16 @@ def test_how_far_hairs_of_a_lock_part_leaves_out_where_the_lock_goes(monkeypatch
 def assert_close(one: dict, other: dict) -> None:
     for name, array in one.items():
         np.testing.assert_allclose(array, other[name], atol=2e-3 * np.abs(other[name]).max())
+
+
+def test_a_column_that_the_first_case_lacks_is_in_the_table(monkeypatch, capsys):
+    """A clip of under 70 frames has no floor, the longer ones after it do; what is not known counts in no mean."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "benchmarks")
+    short, unmoved = (
+        {"kind": kind, "style": "bob", "network motion": error} for kind, error in (("a", 0.4), ("b", np.nan))
+    )
+    rows = [short, unmoved, {"kind": "c", "style": "bob", "network motion": 0.2, "floor motion": 0.1}]
+    import_module("quality").table(rows, "style")
+    heading, _, bob, every = capsys.readouterr().out.strip().splitlines()
+    assert heading == "| style | network motion | floor motion |"
+    assert bob == "| bob | 0.3 | 0.1 |" and every == "| all | 0.3 | 0.1 |"
