@@ -19,6 +19,11 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return in_order(a * b)
 
 
+def dot_apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (...) of vectors (3, ...), whose components are apart: numpy then computes several times as fast."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """A matrix (k, k) times vectors (..., k)."""
     return in_order(vectors[..., None, :] * matrix)

@@ -7,6 +7,7 @@ import numpy as np
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.mesh import connected_pieces
+from neuralocks_core.sums import dot_apart
 
 _DEEP = 2e-3
 """Only depths beyond this [m] are proven."""
@@ -98,17 +99,14 @@ def enclosed(points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray) ->
     step = max(1, _AT_ONCE // max(len(triangles), 1))
     for first in range(0, len(points), step):
         away = places[:, None] - points[first : first + step].T[:, :, None]
-        far = np.sqrt(_dot(away, away))
+        far = np.sqrt(dot_apart(away, away))
         (a, la), (b, lb), (c, lc) = ((away.take(corner, axis=2), far.take(corner, axis=1)) for corner in corners)
-        volume = _dot(a, np.stack([b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]]))
-        spread = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+        volume = dot_apart(
+            a, np.stack([b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]])
+        )
+        spread = la * lb * lc + dot_apart(a, b) * lc + dot_apart(b, c) * la + dot_apart(c, a) * lb
         inside[first : first + step] = 2 * np.arctan2(volume, spread).sum(axis=1) > 2 * np.pi
     return inside
-
-
-def _dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Products (...,) of vectors (3, ...), whose components are apart: numpy then computes several times as fast."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 from neuralocks_core.body.entry_depth import depths_along
 from neuralocks_core.body.near_body import PosedBody
 from neuralocks_core.strands.strand_set import CLAMPED
+from neuralocks_core.sums import dot_apart
 
 MARGIN = 0.001
 """Clearance that a pushed vertex gets [m]."""
@@ -173,8 +174,8 @@ def _supposed(planes: list[tuple]) -> tuple[np.ndarray, np.ndarray]:
         planes: of the vertex before and of the wanted place, distance (n,), its direction (3, n) and the way from there (3, n).
     """
     (first, up, step), (second, other, far) = planes
-    height = np.where(first < 2 * MARGIN, first + _dot(up, step), np.inf)
-    nearer = np.where(second < 0, second + _dot(other, far), -np.inf)
+    height = np.where(first < 2 * MARGIN, first + dot_apart(up, step), np.inf)
+    nearer = np.where(second < 0, second + dot_apart(other, far), -np.inf)
     return np.maximum(height, nearer), np.where(nearer > height, other, up)
 
 
@@ -184,7 +185,7 @@ def _aimed(edge: np.ndarray, off: np.ndarray, length: np.ndarray) -> np.ndarray:
     By less than a segment: strands turn towards their wanted places, and never turn round on the way.
     """
     most = BACK * length
-    aim = edge + off * (most / np.sqrt(_dot(off, off) + most**2 + 1e-30))
+    aim = edge + off * (most / np.sqrt(dot_apart(off, off) + most**2 + 1e-30))
     aim *= length / np.maximum(_size(aim), 1e-12)
     return aim
 
@@ -194,18 +195,14 @@ def _tilted(along: np.ndarray, up: np.ndarray, lack: np.ndarray, length: np.ndar
 
     They point straight away from the body if even that is not enough.
     """
-    rise = _dot(along, up)
+    rise = dot_apart(along, up)
     slope = np.clip(rise + lack, -length, length)
     # A billionth sideways: a segment that goes straight down has to fall to some side.
     side = along - rise * up + 1e-9 * up[[1, 2, 0]]
-    side -= _dot(side, up) * up
+    side -= dot_apart(side, up) * up
     side *= np.sqrt(length**2 - slope**2) / np.maximum(_size(side), 1e-30)
     return side + slope * up, slope - rise
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 def _size(a: np.ndarray) -> np.ndarray:
-    return np.sqrt(_dot(a, a))
+    return np.sqrt(dot_apart(a, a))

@@ -11,7 +11,7 @@ from scipy import ndimage
 from neuralocks_core.body.tree_search import search, surface_tree
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.hairstyles.scalp import Scalp
-from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.mesh import across, vertex_normals
 
 _CELL = 0.08
 """Grid spacing in head radii (7 mm on an adult)."""
@@ -103,7 +103,7 @@ def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> 
     if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points) or not np.isfinite(points).all():
         raise NeuralocksError("body: is not a triangle mesh of finite points; repair the mesh")
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    face = np.cross(b - a, c - a)
+    face = across(points[triangles])
     face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
     used = np.unique(triangles)
     sample = np.concatenate([points[used], (a + b + c) / 3])

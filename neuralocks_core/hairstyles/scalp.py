@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.mesh import across, vertex_normals
 from neuralocks_core.rotation import unit
 
 # The hairline seen from the side: (forward, up). Forward is -1 at the back of the skull and 1 at the
@@ -67,8 +67,7 @@ class Scalp:
 
     @property
     def _areas(self) -> np.ndarray:
-        a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
-        return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+        return np.linalg.norm(across(self.points[self.triangles]), axis=1) / 2
 
     def roots(self, count: int, random: np.random.Generator) -> Roots:
         """`count` roots spread evenly over the scalp, thinning out towards its border.
@@ -171,7 +170,7 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
     back, front = skull[:, 2].min(), skull[:, 2].max()
     forward = (2 * seen[:, 2] - front - back) / max(front - back, 1e-9)
     up = np.interp(forward, _HAIRLINE[:, 0], _HAIRLINE[:, 1])
-    outward = (np.cross(b - a, c - a) * middle).sum(axis=1) > 0
+    outward = (across(points[triangles]) * middle).sum(axis=1) > 0
     # Ears stick out sideways below the hairline's arch; the eyeballs and the mouth lie too deep.
     size = np.linalg.norm(seen, axis=1)
     ear = (np.abs(seen[:, 0]) > 0.78) & (seen[:, 1] < 0.05)
