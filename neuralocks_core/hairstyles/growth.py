@@ -76,25 +76,25 @@ CHUNK = 4096
 """Strands worked on at a time: their arrays stay in the processor's cache."""
 
 
-def march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int) -> np.ndarray:
-    """(S, steps, 3) float32 [m] strands from their roots, cut and evenly spaced."""
-    points = np.empty((len(plan.length), steps, 3), np.float32)
+def march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
+    """(S, STEPS, 3) float32 [m] strands from their roots, cut and evenly spaced."""
+    points = np.empty((len(plan.length), STEPS, 3), np.float32)
     for start in range(0, len(points), CHUNK):
         part = slice(start, start + CHUNK)
-        points[part] = _march(site.rows(part), plan.rows(part), scalp, obstacle, steps)
+        points[part] = _march(site.rows(part), plan.rows(part), scalp, obstacle)
     return points
 
 
-def _march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle, steps: int) -> np.ndarray:
+def _march(site: Site, plan: Plan, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
     size = scalp.radius / 0.1
     length = plan.length * size
-    step = length / (steps - 1)
-    points = np.empty((len(length), steps, 3), np.float32)
+    step = length / (STEPS - 1)
+    points = np.empty((len(length), STEPS, 3), np.float32)
     points[:, 0] = site.roots.place
     at, direction = site.roots.place.astype(np.float64), plan.first
     near = np.zeros(len(at), bool)
     front = np.where(site.seen[:, 2] > 0.30 + 0.25 * site.of_clump[:, 2], 1.0, -1.0)
-    for vertex in range(1, steps):
+    for vertex in range(1, STEPS):
         grown = step * vertex
         falls = smooth(grown / (plan.comb_reach * size))[:, None]
         target = unit(plan.comb * (1 - falls) + plan.fall * falls)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neuralocks_core.hairstyles.growth import DOWN, STEPS, Plan, Site, march, smooth
+from neuralocks_core.hairstyles.growth import DOWN, Plan, Site, march, smooth
 from neuralocks_core.hairstyles.obstacle import Obstacle
 from neuralocks_core.hairstyles.scalp import Scalp
 from neuralocks_core.hairstyles.shaping import Shape
@@ -24,7 +24,7 @@ class Loose(Style):
     plan: Callable[[Site], Plan]
 
     def axis(self, site: Site, scalp: Scalp, obstacle: Obstacle) -> np.ndarray:
-        return march(site, self.plan(site), scalp, obstacle, STEPS)
+        return march(site, self.plan(site), scalp, obstacle)
 
     def varied(self, variation: Variation) -> Loose:
         return replace(
