@@ -159,7 +159,7 @@ def _make_ready(scene) -> None:
     live.refresh(scene, wait=True, moved=True)
     for armature in live.carriers(scene):
         try:
-            ensure(bpy.context, armature, looking=True)
+            ensure(bpy.context, armature)
         except NeuralocksError as error:
             session.messages[armature.name_full] = str(error)
     live.refresh(scene, wait=True)

@@ -11,12 +11,10 @@ from .sampling import in_slices
 from .stepping import step, stepping
 
 
-def ensure(context, armature, looking: bool = False) -> SampledRig:
-    """The sampled motion, sampled now if there is none or it is stale; with `looking`, also if some of its frames are not as they
-    were.
-    """
+def ensure(context, armature) -> SampledRig:
+    """The sampled motion, sampled now if there is none, if it is stale, or if some of its frames are not as they were."""
     found = known(armature, context.scene)
-    if found is None or (looking and not _as_sampled(context, armature, found)):
+    if found is None or not _as_sampled(context, armature, found):
         for _ in in_slices(context, armature):
             pass
         found = session.rigs[armature.name_full]
