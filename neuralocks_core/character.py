@@ -6,7 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from neuralocks_core.anatomy.humanoid import Humanoid, copies, find_humanoid
+from neuralocks_core.anatomy.hierarchy import copies
+from neuralocks_core.anatomy.humanoid import Humanoid, find_humanoid
 from neuralocks_core.anatomy.joint_names import own_names
 from neuralocks_core.anatomy.own_skin import own_skin
 from neuralocks_core.errors import NeuralocksError

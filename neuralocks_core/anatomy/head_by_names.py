@@ -5,8 +5,8 @@ import re
 
 import numpy as np
 
+from neuralocks_core.anatomy.hierarchy import depth
 from neuralocks_core.anatomy.joint_names import leaf
-from neuralocks_core.anatomy.limb_names import depth
 
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from neuralocks_core.anatomy.head_by_names import head_by_names
+from neuralocks_core.anatomy.hierarchy import ancestors, below, copies
 from neuralocks_core.anatomy.joint_names import find_joint, leaf, sides_and_keys
 from neuralocks_core.anatomy.limb_chains import below_first
-from neuralocks_core.anatomy.limb_names import PARTS, ancestors, named_limbs
+from neuralocks_core.anatomy.limb_names import PARTS, named_limbs
 from neuralocks_core.anatomy.limb_shapes import limbs_by_shape
 from neuralocks_core.errors import NeuralocksError
 
@@ -25,8 +26,6 @@ SEMANTIC = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part
 BY_HAND = "given by hand"
 SHRUGGED = 0.05
 """By this share of the trunk's length, a chest's joint may be above the shoulders."""
-COPIED = 1e-4
-"""Joints nearer to each other than this share of the rig's size are in the same place."""
 _SPINE = ("spine", "chest", "torso", "waist", "abdomen")
 
 
@@ -117,16 +116,6 @@ def named_head(names) -> str | None:
     return names[found["head"]]
 
 
-def copies(joint: int, parents, positions) -> list[int]:
-    """Other joints in the same bind place (J, 3) that are neither above nor below a joint: control rigs have several of a bone."""
-    if positions is None:
-        return []
-    places = np.asarray(positions, float)
-    near = np.linalg.norm(places - places[joint], axis=1) < COPIED * np.ptp(places, axis=0).max()
-    near[ancestors(joint, parents)] = near[_below(joint, parents)] = False
-    return np.flatnonzero(near).tolist()
-
-
 class _Search:
     """What is found so far, step by step; what an earlier step found stays.
 
@@ -198,8 +187,8 @@ class _Search:
                     continue
                 begin, end = self.joints[first], self.joints.get(rest[1])
                 taken = {joint for name, joint in self.joints.items() if name.startswith(side)}
-                below = below_first(begin, end, self.keys, self.parents, self.positions, taken)
-                for name, joint in zip(rest, below, strict=True):
+                found = below_first(begin, end, self.keys, self.parents, self.positions, taken)
+                for name, joint in zip(rest, found, strict=True):
                     self.put(name, joint, f"below {self.quoted(begin)}")
 
     def find_trunk(self) -> None:
@@ -219,7 +208,7 @@ class _Search:
     def find_head_with_skin(self) -> None:
         """Take the copy of a control that moves the skin for the head."""
         head = self.joints["head"]
-        if self.reasons["head"] == BY_HAND or self.skinned is None or self.skinned[_below(head, self.parents)].any():
+        if self.reasons["head"] == BY_HAND or self.skinned is None or self.skinned[below(head, self.parents)].any():
             return
         with_skin = [joint for joint in self.others if self.skinned[joint]]
         if with_skin:
@@ -270,10 +259,10 @@ class _Search:
         if "upper_chest" not in self.joints:
             self.put("upper_chest", self.way[min(2, len(self.way) - 1)], "two joints below the head")
             return
-        below = _before(self.joints.get("hips"), self._under(self.joints["upper_chest"]))
-        if below:
-            self.put("chest", below[0], "below the upper chest")
-            self.put("spine", below[-1], "above the hips")
+        between = _before(self.joints.get("hips"), self._under(self.joints["upper_chest"]))
+        if between:
+            self.put("chest", between[0], "below the upper chest")
+            self.put("spine", between[-1], "above the hips")
 
     def _both(self, part: str) -> list[int]:
         """Joints of this part of a limb that were found, the left one first."""
@@ -292,10 +281,3 @@ class _Search:
 def _before(end: int | None, way: list[int]) -> list[int]:
     """The joints of a way before one of them; all if it is not on the way."""
     return way[: way.index(end)] if end in way else way
-
-
-def _below(joint: int, parents) -> list[int]:
-    """A joint and all below it."""
-    found = {joint}
-    found.update(other for other, parent in enumerate(parents) if parent in found)  # parents come first
-    return sorted(found)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joints of arms, legs and eyes by their usual names."""
 
+from neuralocks_core.anatomy.hierarchy import ancestors, depth
 from neuralocks_core.anatomy.limb_chains import PARTS_OF_A_BONE, WHOLE
 
 PARTS = {
@@ -32,20 +33,6 @@ def named_limbs(side: str, sides, keys, parents) -> dict[str, int]:
     found["upper_leg"], found["lower_leg"] = own.leg(found["upper_leg"], found["lower_leg"])
     found["shoulder"], found["upper_arm"] = own.arm(found["shoulder"], found["upper_arm"], found["lower_arm"])
     return {part: joint for part, joint in found.items() if joint is not None}
-
-
-def ancestors(joint: int, parents) -> list[int]:
-    """A joint and its ancestors, up to the root."""
-    way = []
-    while joint >= 0:
-        way.append(int(joint))
-        joint = parents[joint]
-    return way
-
-
-def depth(joint: int, parents) -> int:
-    """Number of joints above a joint."""
-    return len(ancestors(joint, parents)) - 1
 
 
 class _Side:
