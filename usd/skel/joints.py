@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 from pxr import Sdf, Usd, UsdSkel, Vt
 
-from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import from_parents, from_quaternion, relative_to_parents
 
 from ..border.arrays import wxyz
 from ..border.placement import Placement
 from ..border.values import as_names, as_numbers
+from .joint_parents import joint_parents
 from .keys import Keys
 from .rig_copy import hair_of, source_of
 
@@ -56,7 +56,7 @@ class JointSource:
         self.names = _names(skeleton.GetJointsAttr())
         if not self.names:
             raise NeuralocksError(f"{self.path}: the skeleton has no joints; export it with its joints")
-        self.parents = self._parents()
+        self.parents = joint_parents(self.path, self.names)
         self.bind, self.rest = self._bind_and_rest(skeleton)
         self.placement = Placement(prim)
         source, self.copied = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource(), None
@@ -144,32 +144,6 @@ class JointSource:
                 f"{self.animation.GetPath()}: blendShapeWeights hold NaN or infinity; repair the animation"
             )
         return result
-
-    def _parents(self) -> np.ndarray:
-        seen: dict[str, int] = {}
-        parents = []
-        for index, name in enumerate(self.names):
-            if not Sdf.Path.IsValidPathString(name):
-                raise NeuralocksError(f"{self.path}: joint {index} is named '{name}', which is not a path; rename it")
-            if name in seen:
-                # Exporters replace each letter that they do not take with '_': all names of a Japanese rig become alike.
-                lost = not any(letter.isalnum() for letter in leaf(name))
-                remedy = (
-                    "export it with Unicode names allowed, or rename its bones" if lost else "make joint paths unique"
-                )
-                raise NeuralocksError(f"{self.path}: joint '{name}' is listed twice; {remedy}")
-            above = Sdf.Path(name).GetParentPath()
-            while (
-                not above.isEmpty
-                and above not in (Sdf.Path.reflexiveRelativePath, Sdf.Path.absoluteRootPath)
-                and str(above) not in seen
-            ):
-                if str(above) in self.names:
-                    raise NeuralocksError(f"{self.path}: joint '{name}' comes before its parent; list parents first")
-                above = above.GetParentPath()
-            parents.append(seen.get(str(above), -1))
-            seen[name] = index
-        return np.array(parents)
 
     def _bind_and_rest(self, skeleton: UsdSkel.Skeleton) -> tuple[np.ndarray, np.ndarray]:
         bind, rest = (self._matrices(a) for a in (skeleton.GetBindTransformsAttr(), skeleton.GetRestTransformsAttr()))
