@@ -10,7 +10,7 @@ from neuralocks_core.motion import LOOP_GAP
 from .hair_notes import hair_notes, unnamed_model
 from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
-from .scene import actions, as_keyed, attach, imported
+from .scene import as_keyed, attach, hair_keys, imported
 from .scene.particles import waiting
 from .scene.paths import usual_output
 from .scene.sampled_from import begins_later, frames_of
@@ -229,7 +229,7 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("neuralocks.bake_keys", text="Bake to Keyframes", icon="KEYINGSET")
         taking = row.row(align=True)
-        taking.enabled = actions.has_keys(armature)
+        taking.enabled = hair_keys.has_keys(armature)
         taking.operator("neuralocks.remove_keys", text="", icon="X")
         if text := as_keyed.changed_since(armature, context.scene):
             words(layout, f"{armature.name_full}: {text}", "ERROR")

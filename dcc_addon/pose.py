@@ -5,9 +5,9 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from .scene.actions import as_before
 from .scene.binding import hidden
 from .scene.clock import shown_frame
+from .scene.hair_keys import as_before
 from .scene.last_called import others_called
 from .scene.sampled_from import timing_of
 from .services.axes import to_core

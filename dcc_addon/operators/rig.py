@@ -14,7 +14,7 @@ from ..blowing import blowing, in_core
 from ..live import refresh
 from ..live_rig import bind, rest, show_rest
 from ..models import model_path
-from ..scene import actions, as_keyed
+from ..scene import as_keyed, hair_keys
 from ..scene.attach import check_own
 from ..scene.clock import stretch_of
 from ..scene.export import write_shot
@@ -63,14 +63,14 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         name = armature.name_full
         check_own(armature)
         first, last = frame_range(scene)
-        actions.check_heard(armature)
+        hair_keys.check_heard(armature)
         try:
             show_rest(armature)
-            with actions.without(armature):
+            with hair_keys.without(armature):
                 sampled = yield from sampling(context, armature)
                 armature = named(name)
                 bones = bind(armature, sampled).bones
-                actions.check_mode_left(armature, bones.bones)
+                hair_keys.check_mode_left(armature, bones.bones)
         finally:  # if the new keys cannot be made, earlier ones, and Live, stay as they were
             refresh(scene)
         frames = frame_numbers(first, last, scene.neuralocks.subframes)
@@ -82,7 +82,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         stretch = 1 / stretch_of(scene)
         settings.rig_live = False
         rest(armature)
-        action = actions.bake_keys(armature, bones.bones, (stretch * frames, turns), (stretch * every, own))
+        action = hair_keys.bake_keys(armature, bones.bones, (stretch * frames, turns), (stretch * every, own))
         as_keyed.remember(action, armature, scene, (first, last))
         return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
 
@@ -96,11 +96,11 @@ class NEURALOCKS_OT_remove_keys(Hardened, bpy.types.Operator):
     def work(self, context):
         armature = shown_armature(context)
         check_own(armature)
-        if not actions.has_keys(armature):
+        if not hair_keys.has_keys(armature):
             raise NeuralocksError(f"{armature.name_full}: it has no baked hair keys; bake them first")
-        actions.check_lasting(armature)
+        hair_keys.check_lasting(armature)
         show_rest(armature)  # what Live stored was turned by the keys; it now stores how the bones are without them
-        library = actions.remove(armature)
+        library = hair_keys.remove(armature)
         refresh(context.scene)
         return f"{armature.name_full}: baked hair keys {f'of {library} muted here' if library else 'removed'}"
 

@@ -3,7 +3,7 @@
 showing these as they were.
 """
 
-from . import actions, as_baked, as_carried, recorded
+from . import as_baked, as_carried, hair_keys, recorded
 
 KEY = "neuralocks_keyed"
 """The property of the action: a number for each part."""
@@ -20,14 +20,14 @@ def remember(action, armature, scene, frames: tuple[int, int]) -> None:
 
 def changed_since(armature, scene) -> str:
     """What was changed since hair keys that play were baked, and shows in this frame, with the remedy; empty if nothing is known to be."""
-    return as_baked.changed(actions.stored(armature, as_baked.KEY), armature, scene, REMEDY)
+    return as_baked.changed(hair_keys.stored(armature, as_baked.KEY), armature, scene, REMEDY)
 
 
 def note(armature, scene) -> str:
     """What the panel says about settings that were changed since keys that play were baked; nothing while the bones are live."""
     if armature.neuralocks_character.rig_live:
         return ""
-    told = actions.stored(armature, KEY)
+    told = hair_keys.stored(armature, KEY)
     parts = [] if told is None else recorded.changed(told, _numbers(armature, scene), FEWEST)
     return recorded.note(parts, REMEDY) if parts else ""
 

@@ -10,8 +10,8 @@ import numpy as np
 from ..services import following
 from ..services import rig as rig_service
 from . import curves
-from .actions import as_before
 from .binding import carrying_bone
+from .hair_keys import as_before
 
 FAR = 0.01
 """Smaller distances are not reported [m]."""

@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 
 from . import recorded
-from .actions import HAIR, as_before
 from .animated import animated, curves_of, strips_of, written
 from .body import up_to_armature, weighed_so
+from .hair_keys import HAIR, as_before
 from .settings import as_set, objects_named, settings_of
 from .shapes import shape
 from .unkeyed import PLACE, value_of

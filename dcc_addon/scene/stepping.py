@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..session import session
-from . import actions, rotations
+from . import hair_keys, rotations
 from .clock import shown_frame
 from .lookup import find
 from .unkeyed import Unkeyed
@@ -37,8 +37,8 @@ class stepping:
             self._live[armature.name_full] = rotations.kept(armature, rotations.kept_in(text))
             rotations.give_back(armature, text, keyed=True)
         self._keyed = ExitStack()
-        for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and actions.beside_others(o)):
-            self._keyed.enter_context(actions.without(armature))
+        for armature in (o for o in self._scene.objects if o.type == "ARMATURE" and hair_keys.beside_others(o)):
+            self._keyed.enter_context(hair_keys.without(armature))
         session.paused += 1
 
     def __exit__(self, *_):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keyframes on the hair bones only, in a separate action that can be muted."""
+"""A bake of hair bones as keyframes: on tracks of its own, which can be muted and removed."""
 
 from contextlib import contextmanager
 
@@ -10,6 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from . import alone, rotations
 from .animated import animated
+from .keyframes import keyed_action, put_on_top
 from .lookup import identified, identity
 from .relations import found_anew
 
@@ -24,8 +25,6 @@ KEPT = "neuralocks_rotations"
 """Property of the action that holds the hair bones' earlier rotations."""
 ALONE = "neuralocks_alone"
 """Property of the same action that holds how the artist's action was set; see `alone`."""
-LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
-"""The number of this interpolation: that of many keys is written at once by numbers only."""
 STILL = 1e-6
 """Rotations that change by less than this over time do not move."""
 
@@ -56,14 +55,14 @@ def bake_keys(armature, bones, hair: tuple[np.ndarray, np.ndarray], own: tuple[n
     frames, before_hair = own
     needed = 1 if np.ptp(before_hair, axis=0).max(initial=0.0) < STILL else len(frames)
     ending = OVERRIDE if armature.override_library else ""
-    below = _action(armature, f"{armature.name} Before Hair", modes, frames[:needed], before_hair[:needed])
-    _strip(data, BEFORE + ending, below)
-    action = _action(armature, f"{armature.name} Hair", modes, *hair)
+    below = keyed_action(armature, f"{armature.name} Before Hair", modes, frames[:needed], before_hair[:needed])
+    put_on_top(data, BEFORE + ending, below)
+    action = keyed_action(armature, f"{armature.name} Hair", modes, *hair)
     action[KEPT], action[ALONE] = before, alone.keep_alone(data, HAIR)
     # If tracks are deleted by hand, the first bake knows the artist's own rotations.
     settings.keys_kept = rotations.joined(before, older[0])
     settings.keys_alone = older[1] or action[ALONE]
-    _strip(data, TRACK + ending, action)
+    put_on_top(data, TRACK + ending, action)
     return action
 
 
@@ -255,48 +254,3 @@ def _library(armature) -> str:
 def _actions(armature, playing: bool = False) -> list:
     tracks = [track for track in _tracks(armature) if not (playing and track.mute)]
     return [strip.action for track in tracks for strip in track.strips if strip.action]
-
-
-def _strip(data, name: str, action) -> None:
-    """Put an action on a new track above all others."""
-    track = data.nla_tracks.new()
-    track.name = name
-    strip = track.strips.new(action.name, int(action.frame_range[0]), action)
-    strip.blend_type, strip.extrapolation = "REPLACE", "HOLD"
-
-
-def _action(armature, label: str, modes: dict[str, str], frames: np.ndarray, turns: np.ndarray):
-    """An action with keys (T, N, 4) at frames (T,) in the rotation mode of each bone."""
-    if frames[0] % 1:  # a strip begins at a whole frame
-        frames, turns = np.append(np.floor(frames[0]), frames), np.concatenate([turns[:1], turns])
-    action = bpy.data.actions.new(label)
-    curves = _curves(action, armature)
-    for column, (name, mode) in enumerate(modes.items()):
-        path = f'pose.bones["{bpy.utils.escape_identifier(name)}"].{rotations.CHANNELS[mode]}'
-        for index, values in enumerate(rotations.values(mode, turns[:, column]).T):
-            curve = _new_curve(curves, path, index, name)
-            curve.keyframe_points.add(len(frames))
-            keys = np.stack([frames, values], axis=1).astype(np.float32)
-            curve.keyframe_points.foreach_set("co", keys.ravel())
-            curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), LINEAR, np.int32))
-            curve.update()
-    return action
-
-
-def _curves(action, armature):
-    """Where F-curves go: in Blender 4.4 and later, into a channel bag of the action's slot for this armature."""
-    if not hasattr(action, "slots"):
-        return action.fcurves
-    slot = action.slots.new("OBJECT", armature.name)
-    layer = action.layers.new("Hair")
-    return layer.strips.new(type="KEYFRAME").channelbag(slot, ensure=True).fcurves
-
-
-def _new_curve(curves, path: str, index: int, group: str):
-    """A new curve in its bone's group; the API for naming the group has changed twice."""
-    for named in ({"group_name": group}, {"action_group": group}, {}):
-        try:
-            return curves.new(path, index=index, **named)
-        except TypeError:
-            continue
-    raise RuntimeError(f"no F-curve for {path}")
