@@ -163,7 +163,7 @@ def test_the_header_needs_no_library(tmp_path):
 
 
 def test_features_from_quaternions(tmp_path):
-    """The header's own features are those that training and baking use."""
+    """The header's own features are those that training and baking use, of quaternions of any length that it says."""
     model = random_model()
     export_c(model, tmp_path / "hair.h")
     rng = np.random.default_rng(3)
@@ -173,6 +173,8 @@ def test_features_from_quaternions(tmp_path):
     head, neck, chest = np.moveaxis(from_quaternion(q), 1, 0)
     relative = np.swapaxes(head, -1, -2)[:, None] @ np.stack([neck, chest], axis=1)
     wanted = held_features(model.spec, relative, np.einsum("nji,nj->ni", head, down))
+    lengths = re.search(r"any length from (\S+) to (\S+)", (tmp_path / "hair.h").read_text()).groups()
+    q *= np.exp(rng.uniform(*np.log(np.array(lengths, float)), (200, 3, 1)))
     rows = np.concatenate([q.reshape(200, 12), down], axis=1)
     assert np.abs(run_c(compiled(tmp_path, INPUT_HARNESS), rows, 15) - wanted).max() < 2e-6
 
