@@ -7,6 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from neuralocks_core import metrics
+from neuralocks_core.body.collider import Collider
+from neuralocks_core.body.enclosed import without_air
+from neuralocks_core.character import Character
 from neuralocks_core.deformation.resolve import Resolver, reach
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import cores
@@ -47,8 +50,9 @@ def _depths(subjects: list[Subject], say: Progress) -> list[dict]:
     if resolver.at_rest is None:
         return [{} for _ in subjects]
     resolver.prepare()
-    at_rest = [resolver.at_rest.distance(each.own_rest, LIMIT)[0] for each in subjects]
     joints, shapes = baked.joints(rig), baked.shapes(rig)
+    bind = first.character.skeleton.bind, rig.clip.shape[0]
+    at_rest = [_distance(first.character, resolver.at_rest, each.own_rest, *bind) for each in subjects]
     allowed = np.concatenate([np.minimum(distance, 0) for distance in at_rest])
     starts = np.cumsum([0, *(len(distance) for distance in at_rest[:-1])])
 
@@ -59,7 +63,10 @@ def _depths(subjects: list[Subject], say: Progress) -> list[dict]:
 
     def measured(frame: int) -> dict[int, np.ndarray]:
         body = resolver.collider(joints[frame], shapes[frame])
-        return {number: body.distance(subjects[number].own[frame], LIMIT)[0] for number in wanted[frame]}
+        pose = joints[frame], shapes[frame]
+        return {
+            number: _distance(first.character, body, subjects[number].own[frame], *pose) for number in wanted[frame]
+        }
 
     with ThreadPoolExecutor(cores()) as pool:
 
@@ -85,3 +92,14 @@ def _depths(subjects: list[Subject], say: Progress) -> list[dict]:
         shares = metrics.penetration(distance[: len(even)], rest)
         results.append(shares | {"penetration_worst_mm": worst, "penetration_frames": len(even)})
     return results
+
+
+def _distance(
+    character: Character, near: Collider, points: np.ndarray, joints: np.ndarray, shape: np.ndarray
+) -> np.ndarray:
+    """Signed distances (...) [m] of points (..., 3) to the body in a pose, of which `near` is what they can reach."""
+    distance, deep = near.distance(points, LIMIT)[0], LIMIT * character.times_human
+    if not (distance < -deep).any():
+        return distance
+    vertices = character.body.posed(character.skinning(joints), shape)
+    return without_air(distance, points, vertices, character.body.triangles, deep)

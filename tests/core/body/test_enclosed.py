@@ -5,7 +5,7 @@ import numpy as np
 import trimesh
 
 from neuralocks_core.body.collider import Collider
-from neuralocks_core.body.enclosed import enclosed, proven_distances
+from neuralocks_core.body.enclosed import enclosed, proven_distances, without_air
 
 
 def test_a_ball_two_balls_and_an_open_one():
@@ -61,3 +61,20 @@ def test_few_points_are_measured_as_many_are():
     near = every < 0.03
     np.testing.assert_allclose(few[near], every[near], atol=1e-9)
     assert (few[~near] > 0.029).all()
+
+
+def test_air_before_an_open_end_is_no_depth_and_what_is_enclosed_stays_as_deep():
+    """A ball, and beside it a tube that is open at both ends, as locks of mesh hair are."""
+    ball, tube = trimesh.creation.icosphere(4, 0.1), trimesh.creation.cylinder(0.03, 0.1, sections=24)
+    sides = tube.faces[np.abs(tube.face_normals[:, 2]) < 0.5]
+    vertices = np.concatenate([ball.vertices, tube.vertices + [0.4, 0, 0]])
+    faces = np.concatenate([ball.faces, sides + len(ball.vertices)])
+    heights = np.array([0.06, 0.08, 0.081, 0.12])
+    points = np.concatenate(
+        [heights[:, None] * [0, 0, 1.0] + [0.402, 0, 0], [[0.0, 0.02, 0], [0.06, 0, 0], [0.2, 0, 0]]]
+    )
+    seeming = Collider(vertices, faces).distance(points)[0]
+    assert (seeming[:6] < -0.01).all() and seeming[6] > 0
+    found = without_air(seeming.reshape(7, 1), points.reshape(7, 1, 3), vertices, faces, 0.005)[:, 0]
+    np.testing.assert_array_equal(found[:4], -seeming[:4])
+    np.testing.assert_array_equal(found[4:], seeming[4:])
