@@ -82,17 +82,10 @@ def read_with_look(
     points = raw.points.astype(np.float32, copy=False)
     _check_finite(points, path)
 
-    scale = wanted if wanted is not None else raw.unit
-    if wanted is None:
-        scalp = _scalp(_roots(raw, points))
-        size = float((points.max(axis=0).astype(np.float64) - points.min(axis=0)).max())
-        likely = _likely_unit(scalp if scalp > 0 else size / 2)  # one strand, or all from one point
-        if scale is None:
-            scale = likely
-            notes.append(_unstated(path, "does not state its unit", scalp, likely))
-        elif scale != likely and size > 0:  # ten times off, or more
-            fact = f"its format counts in {_name(scale)}, which makes it {scale * size:.3g} m of hair"
-            notes.append(f"{path}: {fact}; import --unit {_name(likely)}?")
+    scale = wanted
+    if scale is None:
+        scale, told = _own_unit(raw, points, path)
+        notes += told
     axis = wanted_axis or raw.up
     with np.errstate(over="ignore", invalid="ignore"):  # overflow and NaN are handled below
         points = points * np.float32(scale)
@@ -199,6 +192,19 @@ def _check_finite(points: np.ndarray, path: Path) -> None:
             f"{bad.sum()} of {len(bad)} points are not finite, first number {bad.argmax()}",
             "repair it",
         )
+
+
+def _own_unit(raw: RawGroom, points: np.ndarray, path: Path) -> tuple[float, list[str]]:
+    """The unit [m] of a file's points (P, 3) if the caller names none: its format's, or what suits a head; and the note on it."""
+    scalp = _scalp(_roots(raw, points))
+    size = float((points.max(axis=0).astype(np.float64) - points.min(axis=0)).max())
+    likely = _likely_unit(scalp if scalp > 0 else size / 2)  # one strand, or all from one point
+    if raw.unit is None:
+        return likely, [_unstated(path, "does not state its unit", scalp, likely)]
+    if raw.unit == likely or not size > 0:
+        return raw.unit, []
+    fact = f"its format counts in {_name(raw.unit)}, which makes it {raw.unit * size:.3g} m of hair"  # ten times off, or more
+    return raw.unit, [f"{path}: {fact}; import --unit {_name(likely)}?"]
 
 
 def _roots(raw: RawGroom, points: np.ndarray) -> np.ndarray:

@@ -34,9 +34,26 @@ def read(content: bytes, subject: str) -> RawGroom:
     Raises:
         NeuralocksError: it is truncated, of another version, malformed, or holds no strands.
     """
-    # Line by line into plain arrays: the numbers of a hostile file never become millions of Python objects.
     lines = enumerate(io.BytesIO(content.removeprefix(codecs.BOM_UTF8)), start=1)
-    keys, number, line = _header(lines, subject)
+    keys, *first = _header(lines, subject)
+    points, counts, uv = _strands(lines, *first, subject)
+    notes = []
+    declared = (keys.get(b"numStrands") or [len(counts)])[0]
+    if declared > len(counts):
+        fact = f"its header says {declared:g} strands, it holds {len(counts)}"
+        raise bad_file(subject, fact, "it is truncated: export it again")
+    if declared < len(counts):
+        notes.append(f"{subject}: its header says {declared:g} strands, it holds {len(counts)}")
+    root_uv = np.frombuffer(uv, np.float32).reshape(-1, 2)
+    if not root_uv.any() or np.isnan(root_uv).any():
+        root_uv = None  # exporters without texture coordinates write zeros
+    placed = _placed(np.frombuffer(points, np.float32).reshape(-1, 3), keys)
+    return RawGroom(placed, np.frombuffer(counts, np.int32), None, root_uv, notes=notes)
+
+
+def _strands(lines, number: int, line: bytes, subject: str) -> tuple[array, array, array]:
+    """Coordinates of all vertices, vertices of each strand, and texture coordinates of each, NaN if it has none; from this line on."""
+    # Line by line into plain arrays: the numbers of a hostile file never become millions of Python objects.
     points, counts, uv = array("f"), array("i"), array("f")
     left = 0
     while line:
@@ -63,19 +80,7 @@ def read(content: bytes, subject: str) -> RawGroom:
         raise bad_file(subject, f"ends {left} vertices before strand {len(counts) - 1} does", "it is truncated")
     if not counts:
         raise bad_file(subject, "holds no strands", "export one with hair in it")
-
-    notes = []
-    declared = (keys.get(b"numStrands") or [len(counts)])[0]
-    if declared > len(counts):
-        fact = f"its header says {declared:g} strands, it holds {len(counts)}"
-        raise bad_file(subject, fact, "it is truncated: export it again")
-    if declared < len(counts):
-        notes.append(f"{subject}: its header says {declared:g} strands, it holds {len(counts)}")
-    root_uv = np.frombuffer(uv, np.float32).reshape(-1, 2)
-    if not root_uv.any() or np.isnan(root_uv).any():
-        root_uv = None  # exporters without texture coordinates write zeros
-    placed = _placed(np.frombuffer(points, np.float32).reshape(-1, 3), keys)
-    return RawGroom(placed, np.frombuffer(counts, np.int32), None, root_uv, notes=notes)
+    return points, counts, uv
 
 
 def _header(lines, subject: str) -> tuple[dict[bytes, list[float]], int, bytes]:
