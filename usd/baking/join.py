@@ -69,8 +69,7 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
     every = [_Part(as_path(part, "parts")) for part in ([parts] if alone else parts)]
     if not every:
         raise NeuralocksError("no parts: name the files that neuralocks bake wrote")
-    first, say = every[0], progress or silent
-    stage = open_stage(first.path)
+    stage = open_stage(every[0].path)
     for number, part in enumerate(every):
         part.check_alike(every[:number])
         if one_file(out, part.path):
@@ -79,29 +78,11 @@ def join(parts, out, *, progress: Progress | None = None) -> JoinResult:
     frame = Border.of(stage).frame
     prims = _prims(every, stage)
     plan = {prim.path: _sources(prim.path, every) for prim in prims if any(prim.path in part.grooms for part in every)}
-    total, done = sum(map(len, plan.values())), 0
-    spool = Spool(out, fingerprint([part.path for part in every], {}))
-    try:
-        spool.drop_layers()
-        file = SampleLayer(spool.layer_path, out)
-        with named(out):
-            _copy_header(first.layer, file.layer, out, every)
-        for prim in prims:
-            with named(out):
-                _copy_prim(prim, file.layer)
-            if prim.path in plan:
-                for _ in _copy_samples(prim.path, plan[prim.path], file, frame):
-                    done += 1
-                    say(done, total, str(prim.path))
-        file.close()
-        deliver(spool)
-    except BaseException:
-        spool.discard()
-        raise
+    _write(every, prims, plan, out, frame, progress or silent)
     codes = sorted({code for sources in plan.values() for code in sources})
     missing = _all_gaps(plan, frame, stage)
     thin = dict.fromkeys(note for sources in plan.values() for note in thinned(list(sources), frame))
-    notes = composition_notes(stage, first.path) + missing + [*thin] + out_of_place(stage, out)
+    notes = composition_notes(stage, every[0].path) + missing + [*thin] + out_of_place(stage, out)
     return JoinResult(out, [str(groom) for groom in plan], codes, not missing, notes)
 
 
@@ -218,6 +199,29 @@ def _sources(groom: Sdf.Path, parts: list[_Part]) -> dict[float, _Part]:
         for code in part.codes(groom):
             found.setdefault(code, part)
     return dict(sorted(found.items()))
+
+
+def _write(parts: list[_Part], prims: list[Sdf.PrimSpec], plan: dict, out: Path, frame: float, say: Progress) -> None:
+    """Write the layer, with the samples that `plan` names by groom, and their part."""
+    total, done = sum(map(len, plan.values())), 0
+    spool = Spool(out, fingerprint([part.path for part in parts], {}))
+    try:
+        spool.drop_layers()
+        file = SampleLayer(spool.layer_path, out)
+        with named(out):
+            _copy_header(parts[0].layer, file.layer, out, parts)
+        for prim in prims:
+            with named(out):
+                _copy_prim(prim, file.layer)
+            if prim.path in plan:
+                for _ in _copy_samples(prim.path, plan[prim.path], file, frame):
+                    done += 1
+                    say(done, total, str(prim.path))
+        file.close()
+        deliver(spool)
+    except BaseException:
+        spool.discard()
+        raise
 
 
 def _copy_header(source: Sdf.Layer, target: Sdf.Layer, out: Path, parts: list[_Part]) -> None:

@@ -75,11 +75,7 @@ def _depths(subjects: list[Subject], say: Progress) -> list[dict]:
                 say(number + 1, len(frames), "measuring distances to the body")
                 yield each
 
-        every = np.arange(len(joints))
-        even = every[np.linspace(0, len(every) - 1, min(len(every), FRAMES)).round().astype(int)]
-        rough = np.stack(list(told(roughly, every)))
-        deepest = np.argsort(rough, axis=0, kind="stable")[:DEEPEST_FRAMES].T
-        frames = [np.concatenate([even, np.setdiff1d(own, even)]) for own in deepest]
+        even, frames = _frames(np.stack(list(told(roughly, range(len(joints))))))
         wanted = {
             frame: [number for number, own in enumerate(frames) if frame in own]
             for frame in dict.fromkeys(np.concatenate(frames).tolist())
@@ -92,6 +88,15 @@ def _depths(subjects: list[Subject], say: Progress) -> list[dict]:
         shares = metrics.penetration(distance[: len(even)], rest)
         results.append(shares | {"penetration_worst_mm": worst, "penetration_frames": len(even)})
     return results
+
+
+def _frames(rough: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The frames of a clip to measure: some evenly spread, and for each of G grooms these and then the ones in which it is deepest by
+    rough distances (T, G) [m].
+    """
+    even = np.linspace(0, len(rough) - 1, min(len(rough), FRAMES)).round().astype(int)
+    deepest = np.argsort(rough, axis=0, kind="stable")[:DEEPEST_FRAMES].T
+    return even, [np.concatenate([even, np.setdiff1d(own, even)]) for own in deepest]
 
 
 def _distance(
