@@ -79,17 +79,8 @@ def _write_animation(layer: Sdf.Layer, character: MovedHair) -> str:
     names = Sdf.ValueTypeNames
     Sdf.AttributeSpec(prim, "joints", names.TokenArray, Sdf.VariabilityUniform).default = Vt.TokenArray(order)
     rest = _rest_channels(source, order)
-    for name, kind, array in (
-        ("translations", names.Float3Array, Vt.Vec3fArray),
-        ("scales", names.Half3Array, Vt.Vec3hArray),
-    ):
-        spec = Sdf.AttributeSpec(prim, name, kind)
-        attribute = own.GetPrim().GetAttribute(name) if own else None
-        samples = attribute.GetTimeSamples() if attribute else []
-        if not samples or _has_default(attribute):
-            spec.default = array(_joined(attribute, Usd.TimeCode.Default(), rest[name]))
-        for code in samples:
-            layer.SetTimeSample(spec.path, code, array(_joined(attribute, code, rest[name])))
+    _copy_channel(prim, own, "translations", names.Float3Array, Vt.Vec3fArray, rest)
+    _copy_channel(prim, own, "scales", names.Half3Array, Vt.Vec3hArray, rest)
     spec = Sdf.AttributeSpec(prim, "rotations", names.QuatfArray)
     places = [order.index(name) for name in moved]
     bind = to_quaternion(rotation_part(relative_to_parents(source.bind, source.parents)[joints]))
@@ -110,6 +101,17 @@ def _write_animation(layer: Sdf.Layer, character: MovedHair) -> str:
         tell_source(prim, source.animation, [*moved, *kept], character.outdated)
     _hide_former(prim, source.prim.GetStage().GetPrimAtPath(prim.path))
     return str(prim.path)
+
+
+def _copy_channel(prim: Sdf.PrimSpec, own: UsdSkel.Animation | None, name: str, kind, array: type, rest: dict) -> None:
+    """Write a channel that a bake does not change: the samples of the shot's own animation, and rest values of what it leaves out."""
+    spec = Sdf.AttributeSpec(prim, name, kind)
+    attribute = own.GetPrim().GetAttribute(name) if own else None
+    samples = attribute.GetTimeSamples() if attribute else []
+    if not samples or _has_default(attribute):
+        spec.default = array(_joined(attribute, Usd.TimeCode.Default(), rest[name]))
+    for code in samples:
+        prim.layer.SetTimeSample(spec.path, code, array(_joined(attribute, code, rest[name])))
 
 
 def kept_hair(source: JointSource, joints: np.ndarray) -> dict[str, int]:
