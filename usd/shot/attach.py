@@ -91,19 +91,7 @@ def attach(
     bound = bound_skeleton(prim)
     rig = next((r for r in rigs if r.path == bound), None)
     if rig is not None:
-        to_bind = rig.to_bind @ _between_binds(prim, rig, placement) @ geom_bind(prim)
-        joint, why, shares, turned = _by_own_binding(prim, rig, to_bind)
-        spread = [] if turned else spread_over(rig, path, joint, shares)
-        notes += turned or [*astray(prim, rig, to_bind), *spread]
-        found = Attachment(
-            rig=rig,
-            character=carried_by(rig, joint),
-            to_bind=to_bind,
-            how=f"{why} (its own skel binding)",
-            skinned=True,
-            told=bool(spread),
-            turned=turned,
-        )
+        found = _bound(prim, rig, placement, notes)
     else:
         seats = [seat for rig in rigs if (seat := find_seat(prim, rig, placement, NEAR)) is not None]
         if seats:
@@ -185,6 +173,23 @@ def on_head(prim: Usd.Prim, found: Attachment) -> bool:
     return _away(some_ends(prim), found.character, found.to_bind) <= max(ON_HEAD, _trunk(found.rig) / 2)
 
 
+def _bound(prim: Usd.Prim, rig: StageRig, placement: Placement, notes: list[str]) -> Attachment:
+    """The attachment of a groom that is bound to the rig's skeleton itself."""
+    to_bind = rig.to_bind @ _between_binds(prim, rig, placement) @ geom_bind(prim)
+    joint, why, shares, turned = _by_own_binding(prim, rig, to_bind)
+    spread = [] if turned else spread_over(rig, str(prim.GetPath()), joint, shares)
+    notes += turned or [*astray(prim, rig, to_bind), *spread]
+    return Attachment(
+        rig=rig,
+        character=carried_by(rig, joint),
+        to_bind=to_bind,
+        how=f"{why} (its own skel binding)",
+        skinned=True,
+        told=bool(spread),
+        turned=turned,
+    )
+
+
 def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: list[str]) -> Attachment:
     """By the nearest skinned mesh: in its own space, skin and groom agree whatever a file takes for bind space."""
     nearest = min(seat.distance for seat in seats)
@@ -224,15 +229,10 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
         for rig in (rig for rig in able if not rig.meshes):
             posed = ways(rig, None, placement, likely=False)
             places[rig.path] += [way for way in posed if away(rig, way) < _trunk(rig) / 2]
-    far = [(min(away(rig, way) for way in places[rig.path]), rig) for rig in able]
-    # The one whose head is nearest to the roots; if that is not clear, the one whose prims the groom is among.
-    least = min(distance for distance, _ in far)
-    close = [(distance, rig) for distance, rig in far if distance <= 2 * least]
-    kin = max(kinship(prim, rig.source.prim) for _, rig in close)
-    close = [(distance, rig) for distance, rig in close if kinship(prim, rig.source.prim) == kin]
+    close = _nearest(prim, [(min(away(rig, way) for way in places[rig.path]), rig) for rig in able])
     nearest, rig = close[0]
-    out_of_reach = nearest > _reach(rig)
-    if len(close) > 1 and not out_of_reach:
+    far = nearest if nearest > _reach(rig) else 0.0
+    if len(close) > 1 and not far:
         names = ", ".join(r.path for r in able[:5])
         raise NeuralocksError(
             f"{path}: {len(able)} skeletons could carry it ({names}); choose one with --skeleton PRIM"
@@ -241,8 +241,17 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
     at_default = None if when is None else ways(rig, None, placement)[0]
     why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
     how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
-    far = nearest if out_of_reach else 0.0
     return Attachment(rig, rig.character, to_bind, how, False, at_default, far)
+
+
+def _nearest(prim: Usd.Prim, able: list[tuple[float, StageRig]]) -> list[tuple[float, StageRig]]:
+    """Of skeletons with the distance of their heads from a groom's roots, the nearest; of those that are about as near, the ones among
+    whose prims the groom is most closely.
+    """
+    least = min(distance for distance, _ in able)
+    close = [(distance, rig) for distance, rig in able if distance <= 2 * least]
+    kin = max(kinship(prim, rig.source.prim) for _, rig in close)
+    return [(distance, rig) for distance, rig in close if kinship(prim, rig.source.prim) == kin]
 
 
 def _away(roots: np.ndarray, character: Character, to_bind: np.ndarray) -> float:
