@@ -63,25 +63,7 @@ def at_once(graph) -> bool:
 
 
 def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
-    armature = hair.neuralocks_hair.armature
-    if armature is not None:
-        check_found(armature)
-    if armature is None or not in_scene(armature, home):
-        raise NeuralocksError(
-            f"{hair.name_full}: it has no armature in this scene; choose the character above and press Attach to Character"
-        )
-    if hair.mode in EDITING:
-        _restore(hair)
-        session.hairs.pop(hair.name_full, None)
-        raise NeuralocksError(f"{hair.name_full}: the hair is being edited; Live resumes when you leave this mode")
-    if problem := on_hair_bone(hair):
-        raise NeuralocksError(problem)
-    sampled = session.rigs.get(armature.name_full)
-    if sampled is None:
-        raise unsampled(armature.name_full)
-    if hair.name_full not in sampled.motion.places:
-        sampled.stale = True
-        raise unsampled(armature.name_full, "its motion was sampled without this hair")
+    armature, sampled = _sampled_with(hair, home)
     place = world(hair, graph)
     joined.settle(hair)
     edited.follow(hair, sampled, place)
@@ -110,6 +92,34 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
         # animation, because it is copied as the viewport has it, at another frame.
         hair.update_tag(refresh={"OBJECT", "DATA", "TIME"})
     session.messages.pop(hair.name_full, None)
+
+
+def _sampled_with(hair, home) -> tuple:
+    """The hair's armature and that one's sampled motion.
+
+    Raises:
+        NeuralocksError: the hair cannot move at present; says why.
+    """
+    armature = hair.neuralocks_hair.armature
+    if armature is not None:
+        check_found(armature)
+    if armature is None or not in_scene(armature, home):
+        raise NeuralocksError(
+            f"{hair.name_full}: it has no armature in this scene; choose the character above and press Attach to Character"
+        )
+    if hair.mode in EDITING:
+        _restore(hair)
+        session.hairs.pop(hair.name_full, None)
+        raise NeuralocksError(f"{hair.name_full}: the hair is being edited; Live resumes when you leave this mode")
+    if problem := on_hair_bone(hair):
+        raise NeuralocksError(problem)
+    sampled = session.rigs.get(armature.name_full)
+    if sampled is None:
+        raise unsampled(armature.name_full)
+    if hair.name_full not in sampled.motion.places:
+        sampled.stale = True
+        raise unsampled(armature.name_full, "its motion was sampled without this hair")
+    return armature, sampled
 
 
 def _elsewhere(hair, place: np.ndarray, sampled, row: int, graph) -> bool:

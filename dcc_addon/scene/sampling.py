@@ -196,22 +196,34 @@ class _Recording:
         """World transforms (T, 4, 4) of a joint as Blender gave them, except for rounding to single precision."""
         return self._drawn[:, joint].astype(float) @ np.linalg.inv(self._trim[joint])
 
-    def sampled(self) -> Generator[tuple[int, int], None, SampledRig]:
-        """What was read, as the character and clip that live view and bake use; yields (done, total) while a large body would block
-        Blender.
+    def _hairs(self) -> dict:
+        """The hair objects that are still there, by name."""
+        names = (name for name in self._tracked if name not in self._bodies)
+        return {name: hair for name in names if (hair := find(name)) is not None}
+
+    def _carriers(self) -> dict[str, int]:
+        """What carries hair that rides on a joint below the head, by name; also sets where all that is tracked stands in bind pose, if its
+        motion tells.
         """
-        rig, places, done = self._rig, self._places, (len(self.frames), len(self.frames))
-        motion, binds = Motion.joined(self._parts, places), self._binds
-        hairs = [name for name in self._tracked if name not in self._bodies]
-        of_hairs = {name: places[name] for name in hairs if find(name) is not None}
-        carriers = riding.carriers(rig, self._head, self._heads, self._moved, of_hairs)
+        places, binds, hairs = self._places, self._binds, self._hairs()
+        of_hairs = {name: places[name] for name in hairs}
+        carriers = riding.carriers(self._rig, self._head, self._heads, self._moved, of_hairs)
         for other in self._tracked:
             joint = carriers.get(other, self._head)
             joints = self._heads if joint == self._head else self._moved(joint)
             own = following.on_joint(places[other], places[""], joints, self._bind[joint])
-            if own is None and other in of_hairs and apart_at_rest(find(other), named(self.name)):
+            if own is None and other in hairs and apart_at_rest(hairs[other], named(self.name)):
                 own = following.in_first(places[other], joints, self._bind[joint])
             binds[other] = binds[other] if own is None else own
+        return carriers
+
+    def sampled(self) -> Generator[tuple[int, int], None, SampledRig]:
+        """What was read, as the character and clip that live view and bake use; yields (done, total) while a large body would block
+        Blender.
+        """
+        rig, done = self._rig, (len(self.frames), len(self.frames))
+        motion, binds = Motion.joined(self._parts, self._places), self._binds
+        carriers = self._carriers()
         yield done
         arrays = []
         for body in self._bodies:
@@ -226,6 +238,7 @@ class _Recording:
         before, carried = session.rigs.get(self.name), {}
         if before is not None and rig_service.same(before.character, character):
             character, carried = before.character, before.carried
+        hairs = self._hairs()
         return SampledRig(
             rig,
             motion,
@@ -243,11 +256,11 @@ class _Recording:
             unreported=self._unreported,
             moved_by=self._moved_by,
             hairs_off=riding.strays_told(
-                [hair for name in hairs if name not in carriers and (hair := find(name)) is not None],
+                [hair for name, hair in hairs.items() if name not in carriers],
                 rig,
                 self._heads,
                 self._moved,
-                places,
+                self._places,
                 self._unit,
             ),
             carriers=carriers,
@@ -260,7 +273,7 @@ class _Recording:
                 *rigid_parts.told(
                     armature,
                     [part for name in self._rigid if (part := find(name)) is not None],
-                    [hair for name in hairs if (hair := find(name)) is not None],
+                    list(hairs.values()),
                     binds,
                 ),
             ),
