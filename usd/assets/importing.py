@@ -9,7 +9,7 @@ from pxr import Sdf, UsdGeom, Vt
 
 from neuralocks_core.deformation.freeing import freed
 from neuralocks_core.errors import NeuralocksError, about
-from neuralocks_core.files import as_path
+from neuralocks_core.files import as_path, check_writable
 from neuralocks_core.flags import flag
 from neuralocks_core.formats.look import Look
 from neuralocks_core.groom import Groom
@@ -17,7 +17,7 @@ from neuralocks_core.hairstyles.fitting import sized
 from neuralocks_core.progress import Progress, silent, within
 
 from ..baking.undrawn_points import UndrawnPoints
-from ..border.stage_files import OTHERS, USD, check_not_input, check_not_over
+from ..border.stage_files import OTHERS, USD, check_layer_name, check_not_input, check_not_over
 from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
 from ..skel.stage_rig import StageRig
@@ -67,12 +67,14 @@ def import_groom(
     """
     sources = [as_path(each, "source") for each in (source if isinstance(source, list | tuple) else [source])]
     out, rig, over, notes, found = as_path(out, "out"), None, None, [], []
+    check_layer_name(out)
     with_character = flag("--with-character", with_character)
     for option, value in (("with-character", with_character), ("skeleton", skeleton), ("head", head)):
         if value and character is None:
             raise NeuralocksError(f"--{option}: there is no character; name one with --character")
     if grooms and not any(path.suffix.lower() in (*USD, *OTHERS) for path in sources):
         raise NeuralocksError("--groom: only USD files have prims; leave it out")
+    check_writable(out)
     say = progress or silent
     if character is not None:
         say(0, 1000, "looking at the head")

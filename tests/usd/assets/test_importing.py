@@ -309,6 +309,17 @@ def test_what_cannot_be_put_on_a_head_is_refused(tmp_path, foreign):
     assert shot.read_bytes() == before and not (tmp_path / "out.usda").exists()
 
 
+@pytest.mark.parametrize(
+    ("name", "words"), [("x.txt", "end its name with .usd"), ("file/x.usda", "not a folder, on the way")]
+)
+def test_where_nothing_can_be_written_is_told_before_anything_is_read(tmp_path, name, words):
+    """Putting a full head of hair on a character takes a minute."""
+    (tmp_path / "file").touch()
+    with pytest.raises(NeuralocksError, match=words):
+        import_groom(tmp_path / "unread.tfx", tmp_path / name, character=tmp_path / "unread.usda")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
 def test_the_command_puts_several_files_on_one_head(tmp_path, foreign, capsys):
     words = ["import", foreign, foreign, "-o", tmp_path / "two.usda", "--character", BODY, "--json"]
     assert status(*words) == 0
