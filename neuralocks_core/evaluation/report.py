@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.files import atomic_write
+from neuralocks_core.files import atomic_write, check_writable
 from neuralocks_core.json_values import plain
 
 LABELS = {
@@ -190,15 +190,14 @@ def check_plot(path: str | os.PathLike) -> Path:
     """The path, if `Card.plot` can draw such a file: check it before a long measurement, not after.
 
     Raises:
-        NeuralocksError: the extension is unknown, the path is a folder, or matplotlib is missing.
+        NeuralocksError: the extension is unknown, the path is a folder or cannot be written, or matplotlib is missing.
     """
     path = Path(path)
     if path.suffix.lower() not in PLOTS:
         raise NeuralocksError(f"{path}: unknown kind of picture; end it in {', '.join(PLOTS)}")
-    if path.is_dir():
-        raise NeuralocksError(f"{path}: is a folder; give a file name")
     if find_spec("matplotlib") is None:
         raise NeuralocksError(f'{path}: matplotlib is not installed; pip install "neuralocks[compare]"')
+    check_writable(path)
     return path
 
 

@@ -130,6 +130,13 @@ def test_numbers_are_written_plainly(tmp_path, model, capsys):
         assert fact in capsys.readouterr().err
 
 
+def test_a_plot_that_cannot_be_written_is_told_before_the_work(tmp_path, capsys):
+    pytest.importorskip("matplotlib", reason="the extra 'compare' is not installed")
+    (tmp_path / "file").touch()
+    assert status("evaluate", tmp_path / "none.usdc", "--plot", tmp_path / "file" / "tips.png") == 1
+    assert "tips.png: there is a file, not a folder, on the way" in capsys.readouterr().err
+
+
 def test_a_folder_where_a_file_is_to_be_is_told_before_the_work(tmp_path, capsys):
     (tmp_path / "tips.png").mkdir()
     assert status("evaluate", tmp_path / "none.usdc", "--plot", tmp_path / "tips.png") == 1
