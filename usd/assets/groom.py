@@ -162,8 +162,8 @@ def _guessed_uv(groom: Groom) -> np.ndarray:
 
 
 def _free_path(stage: Usd.Stage, above: Sdf.Path, name: str) -> Sdf.Path:
-    """An unused path of a prim for a name, which may be a file or a prim path."""
-    base = Path(name.rsplit("/", 1)[-1]).stem or "Hair"
+    """An unused path of a prim for a name, which may be a file's without its extension, or a prim path."""
+    base = name.rsplit("/", 1)[-1] or "Hair"
     base = Tf.MakeValidIdentifier(f"_{base}" if base[0].isdecimal() else base)  # which would replace a digit
     path, number = above.AppendChild(base), 1
     while stage.GetPrimAtPath(path):

@@ -225,12 +225,14 @@ def test_parts_in_one_unknown_unit_keep_together(tmp_path):
 
 
 def test_numbers_of_files_are_in_the_names_of_prims(tmp_path):
-    """A prim's name cannot begin with one, and hair 1 and hair 2 were told apart by nothing but their order."""
-    files = [put(tmp_path, f"{name}.tfx", tressfx_text(np.eye(4, 3), [2, 2])) for name in ("12", "3 braid")]
+    """A prim's name cannot begin with one, nor have a point, and else only their order would tell hair 1 from hair 2."""
+    names = ("12", "3 braid", "bun.v1", "bun.v2")
+    files = [put(tmp_path, f"{name}.tfx", tressfx_text(np.eye(4, 3), [2, 2])) for name in names]
     out = tmp_path / "both.usda"
     import_groom(files, out, "m")
     stage = Usd.Stage.Open(str(out))
-    assert [prim.GetName() for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves)] == ["_12", "_3_braid"]
+    curves = [prim.GetName() for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves)]
+    assert curves == ["_12", "_3_braid", "bun_v1", "bun_v2"]
 
 
 def test_hair_that_a_skeleton_carries_is_imported_where_skinning_shows_it(tmp_path):
