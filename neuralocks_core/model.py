@@ -159,6 +159,10 @@ def read(path: str | os.PathLike, kind: str | None = None) -> ModelFile:
         RuntimeError,
         RecursionError,
     ) as error:
+        if path.suffix.lower() != SUFFIX:
+            raise NeuralocksError(
+                f"{path}: it is not a neuralocks model ({fact_of(error)}); choose a {SUFFIX} file"
+            ) from None
         raise NeuralocksError(f"{path}: damaged or not a model ({fact_of(error)}); get an undamaged copy") from None
     return ModelFile(path, meta, graphs)
 

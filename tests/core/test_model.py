@@ -64,6 +64,13 @@ def test_what_unpacks_to_more_than_it_claims_is_unpacked_as_far_as_that(tmp_path
         tracemalloc.stop()
 
 
+def test_of_a_file_that_is_no_model_by_its_name_either_another_is_asked_for(tmp_path):
+    """A shot in place of a model, such as `export shot.usda`, is not a damaged one of which there is a better copy."""
+    (tmp_path / "shot.usda").write_text("#usda 1.0")
+    with pytest.raises(NeuralocksError, match=r"shot.usda: it is not a neuralocks model .*; choose a .neuralocks file"):
+        model.read(tmp_path / "shot.usda")
+
+
 @pytest.mark.parametrize("packed", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_damage_is_told_in_one_line_however_a_file_is_packed(tmp_path, packed):
     """Each way to pack entries has its own errors."""
