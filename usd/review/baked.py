@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bake read back: what a renderer would see of it, in metres."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -88,15 +89,28 @@ class Baked:
         """The grooms that are not hidden; all, if all are."""
         return [item for item in self.shot.grooms if drawn(item.prim)] or list(self.shot.grooms)
 
+    @property
+    def drawn(self) -> list[StageGroom]:
+        """Those of them that a preview draws: of the first one's person."""
+        return [item for item in self.shown if self.is_first(item.attachment.rig)]
+
     def is_first(self, rig: StageRig) -> bool:
         """Whether a skeleton is that of the first groom that is shown, or another one of the same person."""
         first = self.shown[0].attachment.rig
         return rig is first or one_person(first, rig)
 
+    def broken(self, items: Iterable[StageGroom]) -> list[str]:
+        """The notes on frames that grooms lack between others; a bake of a part of the shot is whole."""
+        lines = []
+        for item in items:
+            if where := some(gaps(list(self.alone(item).codes), self.shot.border.frame)):
+                fact = f"has no samples {where}, where hair moves along straight lines"
+                lines.append(f"{item.path}: {fact}; bake these frames, too")
+        return lines
+
     def scene(self) -> Scene:
         """All hair and the body of the first groom's person, for a preview; what is hidden only if nothing else is there."""
-        first = self.shown[0].attachment
-        items = [item for item in self.shown if self.is_first(item.attachment.rig)]
+        first, items = self.shown[0].attachment, self.drawn
         character, rig = first.character, first.rig
         body = character.body if character.body is not None and len(character.body.points) <= MOST_BODY_POINTS else None
         head = np.stack([character.carrying(rig.joints_at(code)) for code in self.codes])
@@ -150,19 +164,9 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
     left = [f"{path}: its points do not move; left out" for path, codes in sampled.items() if len(codes) < least]
     old = [note for item in items for note in baked_from_others(item.prim, item.attachment, item.groom)]
     old += [note for item in items for note in retimed(item.prim)]
-    broken = [note for item in items for note in _broken(item.path, list(sampled[item.path]), shot)]
     codes = sorted({code for item in items for code in sampled[item.path]})
-    return Baked(replace(shot, grooms=items, notes=(*shot.notes, *left, *old, *broken)), np.array(codes))
-
-
-def _broken(path: str, codes: list[float], shot: Shot) -> list[str]:
-    """The note on frames that a groom lacks between others; a bake of a part of the shot is whole."""
-    where = some(gaps(codes, shot.border.frame))
-    return (
-        [f"{path}: has no samples {where}, where hair moves along straight lines; bake these frames, too"]
-        if where
-        else []
-    )
+    baked = Baked(replace(shot, grooms=items), np.array(codes))
+    return replace(baked, shot=replace(baked.shot, notes=(*shot.notes, *left, *old, *baked.broken(items))))
 
 
 def _named_head(shot: Shot) -> str | None:

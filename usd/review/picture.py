@@ -23,6 +23,7 @@ from ..border.units import Border
 from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
 from ..shot.curves import find_curves
+from ..shot.notes import few
 from .baked import MOST_BODY_POINTS, Baked, read_baked
 
 SIDES = 16, 4096
@@ -110,6 +111,7 @@ def _strands(baked: Baked, tell) -> tuple[drawing.Scene, Border]:
     drawn = baked.shown[0].attachment.rig.path
     rigs = {item.attachment.rig.path: item.attachment.rig for item in baked.shot.grooms}
     notes += _undrawn(drawn, [path for path, rig in rigs.items() if not baked.is_first(rig)])
+    notes += few(baked.broken(baked.drawn), "grooms lack frames")
     if scene.body is None and (body := baked.shown[0].attachment.character.body) is not None:
         notes.append(
             f"{drawn}: its body has {len(body.points)} points, more than {MOST_BODY_POINTS}, so only its hair is drawn"

@@ -130,6 +130,22 @@ def test_frames_that_the_bake_lacks_and_sizes_that_nobody_draws_are_refused(hair
             picture.preview(hair, tmp_path / "hair.png", size=size)
 
 
+def test_frames_that_the_bake_lacks_between_others_are_told(hair, tmp_path, monkeypatch):
+    """A clip stood still there, and a strip showed other frames than those asked for."""
+    monkeypatch.setattr(picture.drawing, "render", lambda scene, path, **_: path)
+    layer, told = Sdf.Layer.OpenAsAnonymous(str(hair)), []
+    layer.subLayerPaths[:] = [str(hair.with_name("shot.usda"))]
+    for code in np.arange(7, 11, 0.5):
+        layer.EraseTimeSample("/Hero/Hair.points", code)
+    layer.Export(str(tmp_path / "part.usdc"))
+    picture.preview(tmp_path / "part.usdc", "hair.png", frames="8:9", tell=told.extend)
+    assert told == [
+        "/Hero/Hair: has no samples between 6 and 11, where hair moves along straight lines; bake these frames, too"
+    ]
+    picture.preview(hair, "hair.png", frames="8:9", tell=told.extend)
+    assert len(told) == 1
+
+
 def test_a_clip_has_no_step(hair, tmp_path, monkeypatch):
     """It plays in real time; the step was dropped without a word."""
     monkeypatch.setattr(picture.drawing, "render", lambda scene, path, *, frames, **_: frames)
