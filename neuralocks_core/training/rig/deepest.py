@@ -12,6 +12,8 @@ from neuralocks_core.training.rig.poses import Moments, PosePool
 
 SEARCHED, KEPT = 2048, 128
 """Poses that are searched, and those of them that are learned from until the next search."""
+MEMORY = 250_000_000
+"""[bytes] for the poses: of bodies with more vertices around the head than the example's, fewer are searched."""
 EVERY, RENEWED = 150, 512
 """Steps from one search to the next, and poses that are replaced before it."""
 LATE = 0.75
@@ -31,7 +33,7 @@ class DeepestPoses:
         rng: decides poses and bodies.
         spec: the network's inputs.
         moments: of motion to draw the poses from; held poses of random necks if left out.
-        searched: number of poses.
+        searched: number of poses, fewer if they would take more than MEMORY.
     """
 
     def __init__(
@@ -43,6 +45,7 @@ class DeepestPoses:
         moments: Moments | None = None,
         searched: int = SEARCHED,
     ):
+        searched = min(searched, max(2 * KEPT, MEMORY // PosePool.size(rig)))
         self._pool, self._energy = PosePool(rig, searched, rng, moments), RigEnergy(rig, material)
         self._rng, self._spec, self._taken = rng, spec, 0
         self._features = np.empty((searched, len(feature_columns(spec))), np.float32)
@@ -59,7 +62,7 @@ class DeepestPoses:
     @torch.no_grad()
     def _search(self, net) -> None:
         if self._taken:
-            self._read(self._pool.renew(min(RENEWED, self._pool.count)))
+            self._read(self._pool.renew(min(RENEWED, self._pool.count // 4)))
         rows = np.arange(self._pool.count)
         some = np.array_split(rows, -(-len(rows) // _TOGETHER))
         depths = [self._energy.depths(self._pool, few, self._turns(net, few)) for few in some]

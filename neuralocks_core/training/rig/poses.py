@@ -69,6 +69,12 @@ class PosePool:
             self._skinning = np.empty((count, len(self._joints), 4, 4))
         self.renew(count)
 
+    @staticmethod
+    def size(rig: HairRig) -> int:
+        """About how many bytes a pose takes, at least 1."""
+        patch = BodyPatch.of(rig, KEPT) if len(rig.points) else None
+        return 1 if patch is None else 12 * len(patch.read.points) + 16 * KEPT
+
     @property
     def collides(self) -> bool:
         """Whether there is a body to collide with."""

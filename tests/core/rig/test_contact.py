@@ -216,6 +216,16 @@ def test_the_deepest_of_many_poses_are_learned_from(monkeypatch, moving):
         before = depth
 
 
+def test_fewer_poses_of_large_bodies_are_searched(monkeypatch):
+    """So that memory is bounded, however many vertices the hair can reach."""
+    rig = cap_over_a_chest()
+    monkeypatch.setattr(deepest, "MEMORY", 300 * PosePool.size(rig))
+    poses = deepest.DeepestPoses(rig, RigMaterial(), np.random.default_rng(0), rig_spec())
+    held = poses._pool._read.nbytes + poses._pool._index.nbytes
+    assert poses._pool.count == 300 and held == pytest.approx(deepest.MEMORY, rel=0.1)
+    assert len(poses.contact(partial(still, rig), 8)) == 8
+
+
 def with_chest(rig: HairRig) -> HairRig:
     """The same rig with another ball, for a chest."""
     who = rig.character
