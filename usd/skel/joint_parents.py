@@ -41,4 +41,4 @@ def joint_parents(skeleton: str, names: Sequence[str]) -> np.ndarray:
             above = above.GetParentPath()
         parents.append(seen.get(str(above), -1))
         seen[name] = index
-    return np.array(parents)
+    return np.array(parents, int)
