@@ -102,8 +102,9 @@ def _to_surface(grid: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> 
     """
     if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points) or not np.isfinite(points).all():
         raise NeuralocksError("body: is not a triangle mesh of finite points; repair the mesh")
-    a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    face = across(points[triangles])
+    corners = points[triangles]
+    a, b, c = corners.swapaxes(0, 1)
+    face = across(corners)
     face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
     used = np.unique(triangles)
     sample = np.concatenate([points[used], (a + b + c) / 3])

@@ -151,7 +151,8 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
     points = np.asarray(points, np.float64)
     triangles = np.asarray(triangles, np.int64)
     head_centre = np.asarray(head_centre, np.float64)
-    a, b, c = (points[triangles[:, corner]] for corner in range(3))
+    corners = points[triangles]
+    a, b, c = corners.swapaxes(0, 1)
     middle = (a + b + c) / 3 - head_centre
     # The skull's radius: up from its centre, where there is nothing but skull.
     above = (np.hypot(middle[:, 0], middle[:, 2]) < 0.06 * size) & (middle[:, 1] > 0)
@@ -170,7 +171,7 @@ def from_head(points: np.ndarray, triangles: np.ndarray, head_centre: np.ndarray
     back, front = skull[:, 2].min(), skull[:, 2].max()
     forward = (2 * seen[:, 2] - front - back) / max(front - back, 1e-9)
     up = np.interp(forward, _HAIRLINE[:, 0], _HAIRLINE[:, 1])
-    outward = (across(points[triangles]) * middle).sum(axis=1) > 0
+    outward = (across(corners) * middle).sum(axis=1) > 0
     # Ears stick out sideways below the hairline's arch; the eyeballs and the mouth lie too deep.
     size = np.linalg.norm(seen, axis=1)
     ear = (np.abs(seen[:, 0]) > 0.78) & (seen[:, 1] < 0.05)
