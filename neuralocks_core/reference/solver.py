@@ -42,7 +42,8 @@ class SimulatedHair:
     it is farther than 2 cm. None if not requested."""
     residual: np.ndarray
     """(T,) rms over strands and vertices of the remaining net force per mass, in 9.81 m/s^2 whatever the gravity, with neighbours
-    and body planes as last updated. It is unreliable if rounding stops a strand before its tolerance."""
+    and body planes as last updated. Solved strands are below `tolerance`; one that no Newton step improves, such as a fold, counts
+    without the tension in its edges, so with about its weight, however near it is."""
     iterations: np.ndarray
     """(T,) mean Newton steps per strand for the frame."""
 

@@ -27,6 +27,8 @@ RATE = wp.constant(wp.float64(1.0))
 """Largest rate at which a Newton step lets the bend vector turn with an edge; 1/2 on a straight strand."""
 STRETCH = wp.constant(wp.float64(1e6))
 """Stiffness against stretch inside a Newton step [m^2/s^2]; the remaining stretch becomes the tension."""
+ROUNDING = wp.constant(wp.float64(1e-15))
+"""Bound on the relative error of double precision after the few operations between a coordinate and a bend."""
 TWIST_TIE = wp.constant(wp.float64(1e3))
 """Stiffness of the row that ties the frames' twist to the edges, in units of the bend stiffness."""
 
@@ -172,6 +174,16 @@ def turn_edges(rods: Rods, scratch: Scratch, c: int, s: int, size: wp.float64):
         scratch.trial[k, c] = here
 
 
+@wp.func
+def blur(rods: Rods, x: array_vec, c: int, s: int):
+    """Bound on what rounding alone changes in the energy of bending, in column c of x: the rounding of a coordinate turns an edge of
+    length l by |x| / l as much. It is no share of the energy itself, which nearly vanishes in stiff short hair."""
+    total = wp.float64(0.0)
+    for i in range(1, x.shape[0] - 1):
+        total += rods.bend[i, s] * (wp.float64(1.0) + wp.length(x[i, c]) / rods.length[i + 1, s])
+    return ROUNDING * total
+
+
 @wp.kernel(enable_backward=False)
 def newton(
     rods: Rods,
@@ -200,6 +212,7 @@ def newton(
     for k in range(vertices):
         scratch.now[k, c] = x[k, s]
     best = energy(rods, load, scratch.now, scratch.frame, c, s)
+    same = blur(rods, scratch.now, c, s)
     left = wp.float64(0.0)
     go = bool(True)  # noqa: UP018 -- warp takes a plain literal for a constant
     n = int(0)  # noqa: UP018
@@ -216,8 +229,8 @@ def newton(
             while search:
                 turn_edges(rods, scratch, c, s, size)
                 value = energy(rods, load, scratch.trial, scratch.frame, c, s)
-                # rounding decides below 1e-13: a converged strand still needs its tension, so equal counts as better
-                if value <= best + wp.float64(1e-13) * wp.abs(best):
+                # a converged strand still needs its tension, so what rounding cannot tell apart counts as better
+                if value <= best + wp.float64(1e-13) * wp.abs(best) + same:
                     best = value
                     search = False
                 else:
