@@ -199,6 +199,15 @@ def test_a_script_without_a_guard_is_told_and_does_not_hang(tmp_path):
     assert "ended early; fix what it reports above" in done.stdout
 
 
+@pytest.fixture
+def hears():
+    """A Python that hears Ctrl-C, also where a shell runs the tests in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("hears")
 def test_ctrl_c_while_processes_start_is_heard_once_they_run(tmp_path, monkeypatch):
     """Starting them takes seconds, in which a terminal's Ctrl-C could be lost."""
     started = []
