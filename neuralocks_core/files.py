@@ -57,7 +57,7 @@ def check_writable(path: Path) -> None:
         NeuralocksError: it is a folder's name or a write-protected file, or nothing can be written there; nothing is left of the
             attempt.
     """
-    if path.is_dir():
+    if os.path.isdir(path):  # also False for a name too long for a file, or where nobody may look: what follows tells
         raise NeuralocksError(f"{path}: is a folder; give a file name")
     try:
         made = make_way(path)

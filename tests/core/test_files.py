@@ -50,6 +50,11 @@ def test_a_folder_that_cannot_be_is_known_before_the_work(tmp_path):
         pytest.fail("the work was begun")
 
 
+def test_a_name_too_long_for_a_file_is_known_before_the_work(tmp_path):
+    with pytest.raises(CannotWrite, match="its name is too long"):
+        check_writable(tmp_path / f"{'x' * 300}.usda")
+
+
 def test_arrays_that_find_no_room_leave_those_that_were_there(tmp_path):
     path = tmp_path / "a.npz"
     replace_npz(path, {"few": np.arange(3)})
