@@ -7,6 +7,7 @@ import numpy as np
 
 from neuralocks_core.body.tree_search import search, surface_tree
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.mesh import welded_vertices
 
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
@@ -103,6 +104,13 @@ class Collider:
         direction = np.where(length[:, None] > 1e-9, along, normal)
         return (sign * length).reshape(shape), direction.reshape(*shape, 3), triangle.reshape(shape)
 
+    def at_open_edge(self, points: np.ndarray, nearest: np.ndarray) -> np.ndarray:
+        """Which of points (N, 3) [m] have an open edge of the mesh as the nearest place, with their nearest triangles (N,) as `closest`
+        has them: beyond such an edge, free air is on the inner side of the face there.
+        """
+        feature = closest_on_triangle(points, *np.moveaxis(self.points[self.triangles[nearest]], 1, 0))[1]
+        return self._open[nearest, feature]
+
     def _nearest(self, points: np.ndarray, samples: np.ndarray, able: np.ndarray):
         """Closest point, pseudonormal there, triangle and distance, of the triangles of those samples (N, k) that are `able`
         (N, k), of which each of the points (N, 3) has one.
@@ -116,6 +124,18 @@ class Collider:
         first = tied[np.unique(row[tied], return_index=True)[1]]
         triangle = candidate[first]
         return place[first], self._pseudonormals[triangle, feature[first]], triangle, np.sqrt(least)
+
+    @cached_property
+    def _open(self) -> np.ndarray:
+        """(F, 7) bool, of features as `_pseudonormals` has them: edges with a face on one side only, and the corners on them."""
+        place = welded_vertices(self.points)[1]  # along a seam of textures, vertices are there twice
+        corners = place[self.triangles]
+        ways = corners[:, [[0, 1], [1, 2], [2, 0]]]
+        rim = ~np.isin(ways @ [1, len(place)], ways @ [len(place), 1])
+        result, on_rim = np.zeros((len(corners), 7), bool), np.zeros(len(place), bool)
+        on_rim[ways[rim]] = True
+        result[:, 1:4], result[:, 4:7] = on_rim[corners], rim
+        return result
 
     @cached_property
     def _pseudonormals(self) -> np.ndarray:

@@ -48,27 +48,28 @@ def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.nda
 
 
 def without_air(
-    distance: np.ndarray, points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray, deep: float
+    distance: np.ndarray, points: np.ndarray, doubted: np.ndarray, vertices: np.ndarray, triangles: np.ndarray
 ) -> np.ndarray:
-    """Signed distances [m], but positive where a point seems deeper than `deep` and the mesh does not enclose it: beyond an open
-    edge, as of a lock of mesh hair or of a head without a neck, the nearest face has free air on its inner side.
+    """Signed distances (...) [m], but positive where a point is doubted and the mesh does not enclose it: beyond an open edge, as of a
+    lock of mesh hair or of a head without a neck, the nearest face has free air on its inner side.
 
     Args:
         distance: of the points, as `Collider` has them (...).
         points: (..., 3) [m].
+        doubted: which points (...) bool to look at, all with distances below 0. A sheet, such as a cape, encloses nothing: whoever is
+            behind its faces should not be among them.
         vertices, triangles: of the mesh, (V, 3) [m] and (F, 3), outward.
-        deep: [m], above 0.
     """
-    places, result = np.reshape(points, (-1, 3)), np.array(distance, float).ravel()
-    seeming = np.flatnonzero(result < -deep)
-    if len(seeming):
+    result = np.array(distance, float)
+    places, depth = points[doubted], -result[doubted]
+    if len(places):
         # Points nearer to each other than to any face are on the same side of all, and proven together.
-        level = np.floor(np.log2(-result[seeming] / deep))
-        cells = np.floor(places[seeming] / (deep * 2**level / np.sqrt(3))[:, None])
+        level = np.floor(np.log2(depth))
+        cells = np.floor(places / (2**level / np.sqrt(3))[:, None])
         first, which = np.unique(np.c_[level, cells], axis=0, return_index=True, return_inverse=True)[1:]
-        air = ~enclosed(places[seeming[first]], vertices, triangles)[which.ravel()]
-        result[seeming[air]] *= -1
-    return result.reshape(np.shape(distance))
+        air = ~enclosed(places[first], vertices, triangles)[which.ravel()]
+        result[doubted] = np.where(air, depth, -depth)
+    return result
 
 
 @lru_cache(maxsize=4)  # a body has the same triangles in every frame

@@ -103,8 +103,10 @@ def _distance(
     character: Character, near: Collider, points: np.ndarray, joints: np.ndarray, shape: np.ndarray
 ) -> np.ndarray:
     """Signed distances (...) [m] of points (..., 3) to the body in a pose, of which `near` is what they can reach."""
-    distance, deep = near.distance(points, LIMIT)[0], LIMIT * character.times_human
-    if not (distance < -deep).any():
+    distance, _, nearest = near.closest(points, LIMIT)
+    doubted = distance < -LIMIT * character.times_human
+    doubted[doubted] = near.at_open_edge(points[doubted], nearest[doubted])
+    if not doubted.any():
         return distance
     vertices = character.body.posed(character.skinning(joints), shape)
-    return without_air(distance, points, vertices, character.body.triangles, deep)
+    return without_air(distance, points, doubted, vertices, character.body.triangles)

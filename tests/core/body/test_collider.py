@@ -82,6 +82,20 @@ def test_points_far_beyond_a_sharp_rim_are_not_inside():
     assert Collider(cone.vertices, cone.faces).distance(points, limit=0.02)[0].min() > 0.03
 
 
+def test_what_lies_beyond_an_open_edge_is_known_and_a_seam_is_none():
+    """A square sheet of 2 m that faces up, cut along x = 0, where its corners are there twice."""
+    x, y = np.array([-1, 0, 0, 1.0]), np.array([-1, 0, 1.0])
+    points = np.stack([*np.meshgrid(x, y, [0.0], indexing="ij")], -1).reshape(-1, 3)
+    left = np.array([[0, 3, 4], [0, 4, 1], [1, 4, 5], [1, 5, 2]])
+    sheet = Collider(points, np.concatenate([left, left + 6]))
+    below = np.array(
+        [[0, 0.3, -0.2], [0, 0, -0.2], [0.4, 0.3, -0.2], [1.2, 0.3, -0.1], [-1.1, -1.1, -0.1], [0, 1.1, -0.1]]
+    )
+    distance, _, nearest = sheet.closest(below)
+    assert (distance < 0).all()
+    assert sheet.at_open_edge(below, nearest).tolist() == [False, False, False, True, True, True]
+
+
 def test_box_is_analytic_with_two_huge_triangles_a_side():
     """Large triangles are found by points near their middle and near their corners."""
     mesh = trimesh.creation.box((2.0, 2.0, 2.0))

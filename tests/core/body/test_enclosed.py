@@ -75,6 +75,7 @@ def test_air_before_an_open_end_is_no_depth_and_what_is_enclosed_stays_as_deep()
     )
     seeming = Collider(vertices, faces).distance(points)[0]
     assert (seeming[:6] < -0.01).all() and seeming[6] > 0
-    found = without_air(seeming.reshape(7, 1), points.reshape(7, 1, 3), vertices, faces, 0.005)[:, 0]
+    doubted = (seeming < 0).reshape(7, 1)
+    found = without_air(seeming.reshape(7, 1), points.reshape(7, 1, 3), doubted, vertices, faces)[:, 0]
     np.testing.assert_array_equal(found[:4], -seeming[:4])
     np.testing.assert_array_equal(found[4:], seeming[4:])

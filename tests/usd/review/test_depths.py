@@ -10,6 +10,15 @@ from usd.review.evaluate import evaluate
 from ..shots import RIG, edited
 
 
+def shoulder_cape(stage) -> None:
+    """A sheet that faces up, just below the tips, and around the chest's top."""
+    turn, far = np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(0.05, 0.4, 10), indexing="ij")
+    points = np.stack([far * np.sin(turn), np.full(far.shape, 1.47), far * np.cos(turn)], -1)
+    inner = np.arange(240).reshape(24, 10)
+    after = np.roll(inner, -1, 0)
+    worn(stage, "/Hero/Cape", points, np.stack([inner[:, :-1], inner[:, 1:], after[:, 1:], after[:, :-1]], -1), 1)
+
+
 def open_locks(stage) -> None:
     """Mesh hair on the neck: eight upright tubes, open at both ends, below the tips."""
     turn, around = np.meshgrid(np.arange(8) * np.pi / 4, np.arange(6) * np.pi / 3, indexing="ij")
@@ -18,13 +27,18 @@ def open_locks(stage) -> None:
     points = np.concatenate([np.stack([x, np.full(x.shape, height), z], -1) for height in (1.39, 1.43)])
     low = np.arange(48).reshape(8, 6)
     faces = np.stack([low, np.roll(low, -1, 1), np.roll(low, -1, 1) + 48, low + 48], -1)
-    mesh = UsdGeom.Mesh.Define(stage, "/Hero/Locks")
+    worn(stage, "/Hero/Locks", points, faces, 2)
+
+
+def worn(stage, path: str, points: np.ndarray, faces: np.ndarray, joint: int) -> None:
+    """A mesh of points (..., 3) [m] and faces (..., 4) that one joint moves."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
-    mesh.CreateFaceVertexCountsAttr([4] * 48)
+    mesh.CreateFaceVertexCountsAttr([4] * (faces.size // 4))
     mesh.CreateFaceVertexIndicesAttr(faces.ravel().tolist())
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     binding.CreateSkeletonRel().SetTargets([RIG])
-    binding.CreateJointIndicesPrimvar(True, 1).Set([2])
+    binding.CreateJointIndicesPrimvar(True, 1).Set([joint])
     binding.CreateJointWeightsPrimvar(True, 1).Set([1.0])
 
 
@@ -33,3 +47,10 @@ def test_hair_before_an_open_end_of_mesh_hair_is_in_no_body(tmp_path, still_mode
     shot = edited(tmp_path, open_locks)
     bake(shot, tmp_path / "hair.usdc", still_model, resolve=False)
     assert evaluate(tmp_path / "hair.usdc").grooms["/Hero/Hair"]["penetration_worst_mm"] < 5
+
+
+def test_hair_that_goes_through_a_cape_is_as_deep_in_it_as_it_is(tmp_path, still_model):
+    """A sheet encloses nothing, but who goes through its middle is not beyond its edge."""
+    shot = edited(tmp_path, shoulder_cape)
+    bake(shot, tmp_path / "hair.usdc", still_model, resolve=False)
+    assert evaluate(tmp_path / "hair.usdc").grooms["/Hero/Hair"]["penetration_worst_mm"] > 20
