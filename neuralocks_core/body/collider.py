@@ -127,15 +127,8 @@ class Collider:
 
     @cached_property
     def _open(self) -> np.ndarray:
-        """(F, 7) bool, of features as `_pseudonormals` has them: edges with a face on one side only, and the corners on them."""
-        place = welded_vertices(self.points)[1]  # along a seam of textures, vertices are there twice
-        corners = place[self.triangles]
-        ways = corners[:, [[0, 1], [1, 2], [2, 0]]]
-        rim = ~np.isin(ways @ [1, len(place)], ways @ [len(place), 1])
-        result, on_rim = np.zeros((len(corners), 7), bool), np.zeros(len(place), bool)
-        on_rim[ways[rim]] = True
-        result[:, 1:4], result[:, 4:7] = on_rim[corners], rim
-        return result
+        """`open_parts`; along a seam of textures, vertices are there twice."""
+        return open_parts(welded_vertices(self.points)[1][self.triangles])
 
     @cached_property
     def _pseudonormals(self) -> np.ndarray:
@@ -159,6 +152,17 @@ class Collider:
         at_edge = gather(which.ravel(), np.repeat(self._normals, 3, axis=0), which.max() + 1)
         result[:, 4:7] = at_edge[which].reshape(-1, 3, 3)
         return result
+
+
+def open_parts(triangles: np.ndarray) -> np.ndarray:
+    """Which features of triangles (F, 3), in the order of `closest_on_triangle`, lie on an edge that no other triangle shares, (F, 7)
+    bool: beyond it, nothing says what is inside. Vertices at one place must be one.
+    """
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    _, which, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    single = count[which.ravel()] == 1
+    corner = np.isin(triangles, edges[single])
+    return np.concatenate([np.zeros((len(triangles), 1), bool), corner, single.reshape(-1, 3)], axis=1)
 
 
 def closest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from neuralocks_core.body.collider import closest_on_triangle
+from neuralocks_core.body.collider import closest_on_triangle, open_parts
 from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.mesh import across, welded_vertices
 from neuralocks_core.rotation import unit
@@ -58,7 +58,7 @@ class SurfaceSamples:
         faces = np.stack([_distinct(own, near) for own, near in zip(owners, dense[close])])
         corners = welded_vertices(points)[1][triangles]
         read = np.flatnonzero(np.isin(corners, corners[np.unique(faces)]).any(axis=1))
-        self.faces, self.open, self._corners = np.searchsorted(read, faces), _open_parts(corners)[read], corners[read]
+        self.faces, self.open, self._corners = np.searchsorted(read, faces), open_parts(corners)[read], corners[read]
         self.vertices, own = np.unique(triangles[read], return_inverse=True)
         self.triangles = own.reshape(-1, 3)
         self._ring = np.argsort(self._corners, axis=None, kind="stable") // 3
@@ -155,12 +155,3 @@ def _distinct(own: int, near: np.ndarray) -> np.ndarray:
     """The first WIDELY of the faces own and near (n,), each once; own again where there are too few."""
     found = list(dict.fromkeys([own, *near.tolist()]))[:WIDELY]
     return np.array(found + [own] * (WIDELY - len(found)))
-
-
-def _open_parts(triangles: np.ndarray) -> np.ndarray:
-    """`SurfaceSamples.open` of triangles (F, 3)."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-    _, which, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    single = count[which.ravel()] == 1
-    corner = np.isin(triangles, edges[single])
-    return np.concatenate([np.zeros((len(triangles), 1), bool), corner, single.reshape(-1, 3)], axis=1)
