@@ -13,7 +13,7 @@ WELDED = 1e-4
 
 
 def across(corners: np.ndarray) -> np.ndarray:
-    """Normals (n, 3), as long as twice the area, of triangles with corners (n, 3, 3); several times as fast as `numpy.cross`."""
+    """Normals (n, 3), as long as twice the area, of triangles with corners (n, 3, 3)."""
     x, y, z = np.moveaxis(corners, 2, 0)
     (ux, vx), (uy, vy), (uz, vz) = ((c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in (x, y, z))
     return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)

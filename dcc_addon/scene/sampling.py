@@ -201,13 +201,9 @@ class _Recording:
         names = (name for name in self._tracked if name not in self._bodies)
         return {name: hair for name in names if (hair := find(name)) is not None}
 
-    def _carriers(self) -> dict[str, int]:
-        """What carries hair that rides on a joint below the head, by name; also sets where all that is tracked stands in bind pose, if its
-        motion tells.
-        """
-        places, binds, hairs = self._places, self._binds, self._hairs()
-        of_hairs = {name: places[name] for name in hairs}
-        carriers = riding.carriers(self._rig, self._head, self._heads, self._moved, of_hairs)
+    def _bind_by_motion(self, carriers: dict[str, int], hairs: dict) -> None:
+        """Set where all that is tracked stands in bind pose, if its motion with what carries it, by name, tells."""
+        places, binds = self._places, self._binds
         for other in self._tracked:
             joint = carriers.get(other, self._head)
             joints = self._heads if joint == self._head else self._moved(joint)
@@ -215,7 +211,6 @@ class _Recording:
             if own is None and other in hairs and apart_at_rest(hairs[other], named(self.name)):
                 own = following.in_first(places[other], joints, self._bind[joint])
             binds[other] = binds[other] if own is None else own
-        return carriers
 
     def sampled(self) -> Generator[tuple[int, int], None, SampledRig]:
         """What was read, as the character and clip that live view and bake use; yields (done, total) while a large body would block
@@ -223,7 +218,10 @@ class _Recording:
         """
         rig, done = self._rig, (len(self.frames), len(self.frames))
         motion, binds = Motion.joined(self._parts, self._places), self._binds
-        carriers = self._carriers()
+        hairs = self._hairs()
+        of_hairs = {name: self._places[name] for name in hairs}
+        carriers = riding.carriers(rig, self._head, self._heads, self._moved, of_hairs)
+        self._bind_by_motion(carriers, hairs)
         yield done
         arrays = []
         for body in self._bodies:
@@ -238,7 +236,7 @@ class _Recording:
         before, carried = session.rigs.get(self.name), {}
         if before is not None and rig_service.same(before.character, character):
             character, carried = before.character, before.carried
-        hairs = self._hairs()
+        hairs = self._hairs()  # whoever works meanwhile may have deleted some
         return SampledRig(
             rig,
             motion,

@@ -13,8 +13,8 @@ CORNERS, MORE, APART = 8, 32, 0.02
 """Points of each joint's mesh that collide with the body: the corners, and up to MORE where one is farther than APART [m] from all
 others, as on large locks. With only spheres at the ends and middles of the bones, the mesh was up to 24 mm deep in the body."""
 ROOM, ROUGH = 0.01, 0.02
-"""[m] What is added to a contact's flight in a step to tell whether it may be near: few move farther, as do edges of limp, broad
-ribbons in a storm. How exactly distances beyond NEAR are known, where only one face is looked at."""
+"""[m] How much farther than its bones fly a contact is taken to move in a step; only edges of limp, broad ribbons move more. How exactly
+distances beyond NEAR are known, where only one face is looked at."""
 BONE_RADIUS = 0.012
 """[m] kept from the body by the bones of hair without a mesh."""
 
