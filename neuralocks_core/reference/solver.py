@@ -150,7 +150,7 @@ def simulate(
         steps = [] if frame == 0 else range((frame - 1) * substeps + 1, frame * substeps + 1)
         for step in steps:
             if body is not None:
-                stepper.move_body(between(body, step, substeps) - away)
+                stepper.move_body(between(body, step, substeps) - away - way.origin[step])
             stepper.blow(between(wind, step, substeps))
             stepper.step(way.turn[step], way.origin[step], dt / substeps, iterations)
         left = stepper.read(result.points[frame], result.planes[frame] if planes else None)

@@ -125,7 +125,9 @@ class Stepper:
         self._run(self.kernels.rest_margin, (self.rest, self.load.plane, self.widest, self.load.margin))
 
     def move_body(self, points: np.ndarray) -> None:
-        """Set the body's world points (V, 3)."""
+        """Set the body's points (V, 3) [m], in world axes from the head's position on: far from the origin, single precision would
+        not find the nearest of them.
+        """
         self._body_now = points = self._body_points(points)
         staged = self.wp.array(points, dtype=self.wp.vec3, device="cpu", copy=False)
         self.wp.copy(self.body, staged)
@@ -164,7 +166,7 @@ class Stepper:
 
     def step(self, turn: np.ndarray, origin: np.ndarray, dt: float, iterations: int) -> None:
         """Advance by `dt` [s] to a new pose of the head, rotation (4,) xyzw and position (3,) [m], in at most `iterations`
-        Newton steps; the body has already been moved.
+        Newton steps; the body has already been moved to its place beside that pose.
         """
         wp = self.wp
         older, self._pose_before = self._pose_before, (self.turn, self.origin)
@@ -242,7 +244,7 @@ class Stepper:
     def _add_drift(self) -> None:
         """Add up how far the body moved in the head's frame: no vertex's distance to it can have shrunk by more."""
         if self.mesh is not None:
-            now = (self._body_now - np.array(self.origin)) @ self._matrix()
+            now = self._body_now @ self._matrix()
             self.drift += float(np.sqrt(np.square(now - self._body_in_head).sum(1).max()))
             self._body_in_head = now
 

@@ -139,7 +139,8 @@ def body_planes(
     plane: wp.array2d(dtype=wp.vec4d),
     wake: wp.array(dtype=wp.int32),
 ):
-    """Nearest body element as a plane through its closest point; distances inside are negative.
+    """Nearest body element as a plane through its closest point; distances inside are negative. The mesh is in world axes, from the
+    head's position on.
 
     drift: the farthest that any point of the body has moved in the head's frame since the beginning, summed over steps. A vertex
     that cannot have come near the body since it was `seen` (head's frame, drift already added to `clear`) has no plane;
@@ -149,8 +150,8 @@ def body_planes(
     k, s = wp.tid()
     if k < 2:
         return
-    p = x[k, s]
-    home = wp.quat_rotate_inv(turn, p - origin)
+    p = x[k, s] - origin
+    home = wp.quat_rotate_inv(turn, p)
     shift = wp.length(home - seen[k, s])
     far = FAR
     if moved == 1:
@@ -183,7 +184,7 @@ def body_planes(
             n = away / gap
         normal = wp.vec3d(wp.float64(n[0]), wp.float64(n[1]), wp.float64(n[2]))
         at = wp.vec3d(wp.float64(near[0]), wp.float64(near[1]), wp.float64(near[2]))
-        found = wp.vec4d(normal[0], normal[1], normal[2], wp.dot(normal, at))
+        found = wp.vec4d(normal[0], normal[1], normal[2], wp.dot(normal, at + origin))
     wake[s] = 1
     face[k, s] = element
     seen[k, s] = home

@@ -34,6 +34,20 @@ def test_the_distance_from_the_origin_does_not_matter(solver):
     assert np.abs(near - far).max() < 1e-5
 
 
+def test_the_distance_travelled_does_not_matter():
+    """A head that turns in a fast vehicle, kilometres from where it began: single precision would lose the body."""
+    rest, head = groom(6), shaken()
+    head[:, :3, 3] = 0
+    points, faces = sphere()
+    body = carried(head, points).astype(float)
+    here = simulate(rest, head, body, faces, rest_support=False).points
+    way = np.zeros((len(head), 3))
+    way[:, 0] = 128.0 * np.arange(len(head))
+    head[:, :3, 3] = way
+    there = simulate(rest, head, body + way[:, None], faces, rest_support=False).points
+    assert np.abs(there - here).max() < 1e-5
+
+
 def test_constant_velocity_is_rest():
     rest = groom(4)
     t = np.arange(10)[:, None] / 30
