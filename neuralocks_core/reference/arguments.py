@@ -101,7 +101,7 @@ def check_body(body: Any, triangles: np.ndarray | None, frames: int) -> tuple[np
     """The first frame's points (V, 3), and the faces (F, 3).
 
     Raises:
-        NeuralocksError: too few frames, wrong shapes, faces out of range.
+        NeuralocksError: too few frames, wrong shapes, faces out of range, points that are not finite.
     """
     if len(body) != frames:
         raise NeuralocksError(f"body: {len(body)} frames for {frames} of the head; give one for each")
@@ -112,7 +112,21 @@ def check_body(body: Any, triangles: np.ndarray | None, frames: int) -> tuple[np
         raise NeuralocksError(f"triangles: are of type {faces.dtype}; give whole numbers, the vertices of each")
     if faces.min() < 0 or faces.max() >= len(first):
         raise NeuralocksError(f"triangles: name vertices outside 0..{len(first) - 1}")
-    return first, faces
+    return check_pose("body", first, len(first)), faces
+
+
+def check_pose(name: str, points: Any, vertices: int) -> np.ndarray:
+    """(V, 3) float64: the body's points in one pose [m].
+
+    Raises:
+        NeuralocksError: these are not its `vertices`, or not finite.
+    """
+    points = number_array(name, points, f"points ({vertices}, 3) in metres")
+    if points.shape != (vertices, 3):
+        raise NeuralocksError(f"{name}: shape {points.shape}; give the vertices of the first frame, ({vertices}, 3)")
+    if not np.isfinite(points).all():
+        raise NeuralocksError(f"{name}: holds values that are not finite; check its skinning")
+    return points
 
 
 def check_start(start: np.ndarray | None, rods: RestRods) -> np.ndarray | None:

@@ -16,6 +16,7 @@ from neuralocks_core.reference.arguments import (
     check_body,
     check_material,
     check_neighbours,
+    check_pose,
     check_settings,
     check_start,
     check_wind,
@@ -142,7 +143,7 @@ def simulate(
         first = first - away
         if bind_body is None:
             bind_body = first @ np.asarray(head[0], np.float64)[:3, :3]
-        stepper.attach_body(np.asarray(bind_body), faces)
+        stepper.attach_body(check_pose("bind_body", bind_body, len(first)), faces)
         stepper.move_body(first)
     stepper.blow(wind[0])
     _begin(stepper, way, rods, start, iterations, volume > 0)

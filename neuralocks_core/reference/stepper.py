@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.motion import G
+from neuralocks_core.reference.arguments import check_pose
 from neuralocks_core.reference.rest import RestRods
 from neuralocks_core.warp_device import start_warp
 
@@ -116,7 +116,7 @@ class Stepper:
     def attach_body(self, bind: np.ndarray, triangles: np.ndarray) -> None:
         """Measure the strands' distances at rest from (V, 3) bind points, canonical."""
         wp = self.wp
-        self.body = wp.array(self._body_points(bind), dtype=wp.vec3, device=self.device)
+        self.body = wp.array(np.ascontiguousarray(bind, np.float32), dtype=wp.vec3, device=self.device)
         faces = wp.array(np.ascontiguousarray(triangles, np.int32).ravel(), dtype=wp.int32, device=self.device)
         self.mesh = wp.Mesh(points=self.body, indices=faces)
         self._pose(np.array([0, 0, 0, 1]), np.zeros(3))
@@ -128,7 +128,8 @@ class Stepper:
         """Set the body's points (V, 3) [m], in world axes from the head's position on: far from the origin, single precision would
         not find the nearest of them.
         """
-        self._body_now = points = self._body_points(points)
+        points = np.ascontiguousarray(check_pose("body", points, self.body.shape[0]), np.float32)
+        self._body_now = points
         staged = self.wp.array(points, dtype=self.wp.vec3, device="cpu", copy=False)
         self.wp.copy(self.body, staged)
         self.mesh.refit()
@@ -262,14 +263,6 @@ class Stepper:
 
     def _run(self, kernel: object, args: tuple) -> None:
         self.wp.launch(kernel, dim=(self.vertices, self.strands), inputs=list(args), device=self.device)
-
-    def _body_points(self, points: np.ndarray) -> np.ndarray:
-        points = np.ascontiguousarray(points, np.float32)
-        if self.mesh is not None and points.shape != self.body.shape + (3,):
-            raise NeuralocksError(f"body: shape {points.shape} in a later frame; keep {self.body.shape + (3,)}")
-        if not np.isfinite(points).all():
-            raise NeuralocksError("body: holds values that are not finite; check its skinning")
-        return points
 
     def _columns(self, scratch: object, shape: tuple) -> object:
         for name in ("now", "trial", "frame"):

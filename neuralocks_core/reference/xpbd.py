@@ -9,7 +9,14 @@ import numpy as np
 from neuralocks_core.materials import MARGIN, NO_PLANE
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress
-from neuralocks_core.reference.arguments import check_body, check_material, check_settings, check_start, check_wind
+from neuralocks_core.reference.arguments import (
+    check_body,
+    check_material,
+    check_pose,
+    check_settings,
+    check_start,
+    check_wind,
+)
 from neuralocks_core.reference.head_motion import HeadMotion, frames_without, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 from neuralocks_core.reference.solver import SimulatedHair
@@ -65,12 +72,14 @@ def simulate_xpbd(
     hair.begin(rods.points if start is None else start, first, drift)
     if body is not None:
         here, faces = check_body(body, triangles, frames)
-        hair.attach_body((here - way.origin[0]) @ first if bind_body is None else np.asarray(bind_body), faces)
+        if bind_body is None:
+            bind_body = (here - way.origin[0]) @ first
+        hair.attach_body(check_pose("bind_body", bind_body, len(here)), faces)
     points = np.zeros((frames, strands, vertices, 3), np.float32)
     for t in range(frames):
         a, b = max(t - 1, 0) * substeps, t * substeps
         if body is not None:
-            hair.look(np.asarray(body[t]) - way.origin[b], a, b)
+            hair.look(check_pose("body", body[t], len(here)) - way.origin[b], a, b)
         if t:
             hair.go(a, b, step, wind[t])
         hair.read(head[t], points[t])

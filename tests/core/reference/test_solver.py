@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the reference promises whatever it is given: exact lengths, rest at rest, no order, no NaN, a clear word."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -225,6 +227,28 @@ def test_errors_name_the_argument(change, word):
 def test_simulators_refuse_the_same_settings(simulator, change):
     with pytest.raises(NeuralocksError, match=f"{next(iter(change))} {next(iter(change.values()))}"):
         simulator(groom(4), np.eye(4)[None], **change)
+
+
+@pytest.mark.parametrize("simulator", [simulate, simulate_xpbd])
+@pytest.mark.parametrize(
+    "name, frame, spoiled, word",
+    [
+        ("body", 1, lambda points: np.where(points > 0.09, np.nan, points), "holds values that are not finite"),
+        ("body", 1, lambda points: points[:-1], "shape (265, 3); give the vertices of the first frame, (266, 3)"),
+        ("bind_body", None, lambda points: points[:5], "shape (5, 3); give the vertices of the first frame"),
+        ("bind_body", None, lambda points: points.ravel(), "shape (798,); give the vertices of the first frame"),
+        ("bind_body", None, lambda points: np.full_like(points, np.inf), "holds values that are not finite"),
+    ],
+)
+def test_simulators_refuse_a_body_that_hair_would_not_meet(simulator, name, frame, spoiled, word):
+    points, faces = sphere()
+    given = {"body": [points, points, points], "bind_body": points}
+    if frame is None:
+        given[name] = spoiled(points)
+    else:
+        given[name][frame] = spoiled(points)
+    with pytest.raises(NeuralocksError, match=re.escape(f"{name}: {word}")):
+        simulator(groom(2), np.tile(np.eye(4), (3, 1, 1)), triangles=faces, **given)
 
 
 @pytest.mark.parametrize("simulator", [simulate, simulate_xpbd])
