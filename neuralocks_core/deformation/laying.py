@@ -39,7 +39,7 @@ def keep_out(displacement: np.ndarray, rest: np.ndarray, clear: np.ndarray, watc
         body: in this pose.
     """
     compiled = body.compiled(rest.shape[1])
-    if compiled is not None and displacement.flags.c_contiguous:
+    if compiled is not None and displacement.flags.c_contiguous and displacement.dtype == np.float32:
         compiled.keep_out(displacement, rest, clear, watch)
         return
     laid = watch == ALWAYS

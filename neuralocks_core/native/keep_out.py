@@ -27,9 +27,10 @@ class KeepOut:
         return vertices == VERTICES and neighbours <= MOST_NEIGHBOURS and library() is not None
 
     def keep_out(self, displacement, rest, keep, watch) -> None:
-        """As `laying.keep_out`; the displacement must be contiguous."""
+        """As `laying.keep_out`; the displacement must be contiguous, and float32."""
         rest, keep = (np.ascontiguousarray(each, np.float32) for each in (rest, keep))
-        arrays = map(at, (rest, displacement, keep, np.ascontiguousarray(watch)))
+        watch = np.ascontiguousarray(watch, np.uint8)
+        arrays = map(at, (rest, displacement, keep, watch))
         library().neuralocks_keep_out(ctypes.byref(self._body), *arrays, c_int64(len(rest)))
 
     def laid(self, points: np.ndarray, keep: np.ndarray) -> np.ndarray:

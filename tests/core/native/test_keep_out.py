@@ -68,6 +68,20 @@ def test_strands_are_laid_the_same(near, monkeypatch):
     assert changed[watch == laying.CHECKED].any() and not changed[watch == laying.NEVER].any()
 
 
+def test_numbers_of_any_type_are_read_as_what_they_are(near):
+    points, clear = hair(50)
+    rest, watch = np.float32(0.9) * points, np.full(len(points), laying.CHECKED, np.uint8)
+    wanted = points - rest
+    laying.keep_out(wanted, rest, clear, watch, posed(near))
+    found = (points - rest).astype(float)
+    laying.keep_out(found, rest, clear, watch.astype(int), posed(near))
+    assert np.abs(wanted - (points - rest)).max() > 0.01
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+    found = points - rest
+    laying.keep_out(found, rest, clear, watch.astype(int), posed(near))
+    np.testing.assert_array_equal(found, wanted)
+
+
 def test_skin_is_posed_the_same(near, monkeypatch):
     """What is arbitrary, a sample for cells that are far from all, is left out."""
     found = posed(near)
