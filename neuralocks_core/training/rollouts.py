@@ -232,6 +232,7 @@ class RolloutMaker:
             lock = usable[groom.lock[usable] == groom.lock[seed]]
             near = np.argsort(np.linalg.norm(groom.rest[lock, 0] - groom.rest[seed, 0], axis=1), kind="stable")[:8]
             chosen.update(dict.fromkeys(lock[near].tolist()))
+            chosen[int(seed)] = None  # it is not among the 8 where more strands have one root
         return np.array(sorted(list(chosen)[: self.scene.strands]))
 
     def _shape(self, rng) -> np.ndarray:

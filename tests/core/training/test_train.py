@@ -38,6 +38,24 @@ def test_a_rollout_depends_on_its_number_alone(scene, tmp_path):
     assert not np.array_equal(one.vectors, RolloutMaker(scene).make(4).vectors)
 
 
+def test_strands_that_share_their_roots_are_all_drawn(scene, monkeypatch):
+    """As of locks that are modelled as bundles: more strands than are drawn around one have the very same root."""
+
+    class Impatient(np.random.Generator):
+        left = 5000
+
+        def integers(self, *args, **kwargs):
+            self.left -= 1
+            assert self.left, "it draws the same strands again and again"
+            return super().integers(*args, **kwargs)
+
+    monkeypatch.setattr("numpy.random.default_rng", lambda seed: Impatient(np.random.PCG64(seed)))
+    hair = scene.grooms[0]
+    rest = hair.rest - hair.rest[:, :1] + hair.rest[hair.lock == 0][0, 0]
+    bundle = replace(hair, rest=rest, lock=np.zeros_like(hair.lock)).subset(np.arange(20))
+    assert RolloutMaker(replace(scene, grooms=(bundle,))).draw(0).strands.tolist() == list(range(20))
+
+
 def test_rollouts_start_at_rest_and_move(scene):
     rollout = RolloutMaker(scene).make(5)
     moved = rollout.moved * rollout.step
