@@ -94,8 +94,11 @@ def train_strands(
     beginning = Beginning(start) if start else None
     if beginning:
         beginning.check(scene.spec, options, resume)
-    if not any(groom.valid.any() for groom in scene.grooms):
-        raise NeuralocksError("grooms: none has a strand with two distinct points; give a groom with hair")
+    for number, groom in enumerate(scene.grooms):
+        if not groom.valid.any():
+            raise NeuralocksError(f"grooms: number {number} has no strand with two distinct points; leave it out")
+    if not scene.grooms:
+        raise NeuralocksError("grooms: there is none; give a groom with hair")
     report = _Reporter(progress)
     with claimed(work):
         if not resume:
@@ -167,7 +170,7 @@ def _inputs_of(scene: TrainingScene, coder: StrandAutoencoder, beginning: Beginn
     strands["hair"] = learned_hair(scene.grooms)
     if beginning:
         return strands | {"began with": beginning.card()}
-    errors = [1e3 * coder.errors(scalp_local(groom)[groom.valid]).mean() for groom in scene.grooms if groom.valid.any()]
+    errors = [1e3 * coder.errors(scalp_local(groom)[groom.valid]).mean() for groom in scene.grooms]
     return strands | {"strand code error [mm]": round(float(np.mean(errors)), 2)}
 
 

@@ -108,6 +108,15 @@ def test_another_history_reads_the_same_simulation(scene):
     assert maker.reread(6, rollout, spec).vectors.shape == (60, spec.size)
 
 
+def test_a_groom_that_cannot_be_learned_from_is_refused_before_anything_is_simulated(scene, in_one_process, tmp_path):
+    hair = scene.grooms[0]
+    bare = replace(hair, valid=np.zeros_like(hair.valid))
+    for grooms, fact in (((hair, bare), "number 1 has no strand"), ((), "there is none")):
+        with pytest.raises(NeuralocksError, match=f"^grooms: {fact}"):
+            train_strands(replace(scene, grooms=grooms), tmp_path / "hair.neuralocks", RegressionOptions(steps=2))
+    assert not any(tmp_path.iterdir())
+
+
 def test_held_out_strands_are_never_trained_on(scene):
     groom = scene.grooms[0]
     assert not set(held_out_split(groom, True)) & set(held_out_split(groom, False))
