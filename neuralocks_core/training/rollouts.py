@@ -16,6 +16,7 @@ from neuralocks_core.body.tree_search import surface_tree
 from neuralocks_core.boundary import BoundarySampler, joints_read
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.character import Character
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES, Material, at_weight_one
 from neuralocks_core.measures import body_measures
 from neuralocks_core.motion import Clip
@@ -50,7 +51,7 @@ class TrainingScene:
         clips: motion to cut from, besides random motion; may be empty.
         spec: the network's inputs.
         seed: of all random choices.
-        frames: length of a rollout, in steps of `spec.dt`.
+        frames: length of a rollout, in steps of `spec.dt`; with `clips`, longer than PREROLL.
         strands: strands of a rollout, in whole locks.
         gestures: how often random motion has each of its gestures, as `random_motion.check_weights` takes it.
         held_out: draw what training never sees: other locks, other random numbers, and no `clips`, since training cuts from all
@@ -69,6 +70,9 @@ class TrainingScene:
 
     def __post_init__(self):
         check_weights(self.gestures)
+        least = PREROLL + 2 if self.clips else 3  # two frames that are learned from, so that they have a velocity
+        if self.frames < least:
+            raise NeuralocksError(f"frames: {self.frames} are too few for a rollout; give at least {least}")
 
     @property
     def span(self) -> float:

@@ -8,6 +8,7 @@ import pytest
 
 from neuralocks_core.animation.gestures import KINDS
 from neuralocks_core.animation.random_motion import scripted_clip
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.metrics import motion_error
 from neuralocks_core.motion import Clip
 from neuralocks_core.smooth_motion import SmoothMotion
@@ -33,6 +34,16 @@ def test_no_rollout_reaches_across_a_cut_of_its_motion(scene):
     for rollout in captured_of(scene, replace(walk, joints=joints, cuts=[4.0]), 6):
         steps = np.diff(rollout.moved[rollout.first :] * rollout.step, axis=0)
         assert np.linalg.norm(steps, axis=-1).max() < 0.2 * length
+
+
+def test_rollouts_that_end_before_they_can_be_learned_from_are_refused(scene):
+    clips = (scripted_clip(scene.character, "walk", 8.0),)
+    with pytest.raises(NeuralocksError, match=f"^frames: {PREROLL + 1} are too few .* at least {PREROLL + 2}"):
+        replace(scene, clips=clips, frames=PREROLL + 1)
+    shortest = RolloutMaker(replace(scene, clips=clips, frames=PREROLL + 2))
+    assert all(len(draw.times) - draw.first >= 2 for draw in map(shortest.draw, range(20)))
+    with pytest.raises(NeuralocksError, match="^frames: 2 are too few"):
+        replace(scene, frames=2)
 
 
 @pytest.mark.parametrize("rate, held", [(24, 1), (24, 2)])
