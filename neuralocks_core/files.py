@@ -181,12 +181,16 @@ def make_way(path: Path) -> list[Path]:
     Raises:
         CannotWrite: the file is there and nobody may write it, as published files and those under some version controls are:
             POSIX systems would let it be replaced all the same.
-        OSError: the file system refuses.
+        OSError: the file system refuses; none of them is left.
     """
     if path.is_file() and not path.is_symlink() and not path.stat().st_mode & 0o222:
         raise CannotWrite(f"{path}: is write-protected; make it writable, or choose another name")
     missing = [folder for folder in path.parents if not os.path.exists(folder)]
-    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except BaseException:  # the outer ones may be there by now
+        remove_empty(missing)
+        raise
     return missing
 
 

@@ -53,6 +53,9 @@ def test_a_folder_that_cannot_be_is_known_before_the_work(tmp_path):
 def test_a_name_too_long_for_a_file_is_known_before_the_work(tmp_path):
     with pytest.raises(CannotWrite, match="its name is too long"):
         check_writable(tmp_path / f"{'x' * 300}.usda")
+    with pytest.raises(CannotWrite, match="its name is too long"):
+        check_writable(tmp_path / "new" / ("x" * 300) / "a.usda")
+    assert not any(tmp_path.iterdir())
 
 
 def test_arrays_that_find_no_room_leave_those_that_were_there(tmp_path):
