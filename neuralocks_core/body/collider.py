@@ -11,6 +11,8 @@ from neuralocks_core.mesh import welded_vertices
 
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
+FLAT = 1e-14
+"""Twice the area [m^2] up to which a triangle has none."""
 CANDIDATES = 160_000
 """Triangles checked at once, for some of the points, to bound memory: a grid around a giant's head has millions."""
 
@@ -37,7 +39,7 @@ class Collider:
         a, b, c = (self.points[triangles[:, i]] for i in range(3))
         cross = np.cross(b - a, c - a)
         area = np.linalg.norm(cross, axis=1)
-        kept = area > 1e-14
+        kept = area > FLAT
         if not kept.any():
             raise NeuralocksError("body: its mesh has no triangle with an area; choose a surface mesh")
         self.triangles = triangles[kept]

@@ -5,8 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from neuralocks_core.body.collider import Collider
-from neuralocks_core.mesh import connected_pieces
+from neuralocks_core.body.collider import FLAT, Collider
+from neuralocks_core.mesh import across, connected_pieces
 from neuralocks_core.sums import dot_apart
 
 _DEEP = 2e-3
@@ -28,6 +28,8 @@ def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.nda
     Where closed parts stand in each other, such as an arm's end in the trunk or a head in a hat, the nearest face may be one that
     is inside the body itself. A point is as deep as it is in the part in which it is deepest.
     """
+    if not len(points):
+        return np.zeros(0)
     result = Collider(vertices, _in_reach(vertices, triangles, points)).distance(points)[0]
     for part in _closed_parts(np.asarray(triangles, np.int64).tobytes()):
         corners = vertices[part]
@@ -97,11 +99,16 @@ def _in_reach(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -
     """Triangles among which the nearest one to any of the points must be, with all that share its nearest corner or edge.
 
     The surface is never farther than the nearest vertex, and all that touches the nearest place is equally near. Indexing a
-    whole body for two points in it takes three times as long.
+    whole body for two points in it takes three times as long. Triangles without area are no surface: what a rig hides is scaled to
+    a point, which may be nearer.
     """
     if len(points) > _FEW_ENOUGH:
         return triangles
     corners = vertices[triangles].astype(float)
+    solid = _lengths(across(corners)) > FLAT
+    if not solid.any():
+        return triangles
+    triangles, corners = triangles[solid], corners[solid]
     centres = corners.mean(axis=1)
     radii = _lengths(corners - centres[:, None]).max(axis=1)
     kept = np.zeros(len(triangles), bool)

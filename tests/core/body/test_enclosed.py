@@ -63,6 +63,17 @@ def test_few_points_are_measured_as_many_are():
     assert (few[~near] > 0.029).all()
 
 
+def test_what_is_scaled_to_a_point_is_no_surface():
+    """A part that a rig hides may collapse in the body or in the air, nearer to a point than the skin."""
+    ball = trimesh.creation.icosphere(4, 0.1)
+    points = np.array([[0.0, 0.0, 0.08], [0.0, 0.0, 0.13]])
+    wanted = proven_distances(ball.vertices, ball.faces, points)
+    hidden = np.concatenate([ball.vertices, np.repeat(points + 1e-3, 3, axis=0)])
+    faces = np.concatenate([ball.faces, len(ball.vertices) + np.arange(6).reshape(2, 3)])
+    np.testing.assert_array_equal(proven_distances(hidden, faces, points), wanted)
+    assert proven_distances(ball.vertices, ball.faces, np.zeros((0, 3))).shape == (0,)
+
+
 def test_air_before_an_open_end_is_no_depth_and_what_is_enclosed_stays_as_deep():
     """A ball, and beside it a tube that is open at both ends, as locks of mesh hair are."""
     ball, tube = trimesh.creation.icosphere(4, 0.1), trimesh.creation.cylinder(0.03, 0.1, sections=24)

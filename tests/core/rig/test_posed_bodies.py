@@ -53,6 +53,14 @@ def test_margins_are_those_at_rest_at_most():
     np.testing.assert_allclose(RigEnergy(rig, RigMaterial()).margins, [-0.004, 0.003, 0.008], atol=1e-3)
 
 
+def test_joints_without_a_mesh_meet_no_body():
+    """Chains that a user names may drive none: they are learned from their bones."""
+    rig, _ = with_balls()
+    bare = replace(rig, points=np.zeros((0, 3)), weights=rig.weights[:0])
+    assert not PosePool(bare, 2, np.random.default_rng(0)).collides
+    assert RigEnergy(bare, RigMaterial()).margins.shape == (0,)
+
+
 def test_hair_that_rests_in_a_hat_is_not_pushed():
     """Also beside the head, whose skin in the hat is nearest and faces it."""
     rig, radius = with_balls()
