@@ -10,6 +10,10 @@ INSIDE_OUT = -0.3
 with arms spread, near 0 for hair cards and cloth, whose sides mean nothing. Below this value the mesh is inside out."""
 WELDED = 1e-4
 """Points this close [m] count as one: files split a skin along texture seams and between meshes."""
+SAME = 1e-7
+"""Points this close [m] are the same one, apart from rounding."""
+_MIXED = np.array([1, -7046029254386353131, 1609587929392839161])
+"""Odd numbers whose multiples, modulo 2^64, give different integers for different places."""
 
 
 def across(corners: np.ndarray) -> np.ndarray:
@@ -51,6 +55,15 @@ def welded_vertices(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     with np.errstate(invalid="ignore"):  # a point light years away fits no integer
         lattice = np.round(points / WELDED).astype(np.int64) @ np.array([1, 1 << 21, 1 << 42])
     return np.unique(lattice, return_index=True, return_inverse=True)[1:]
+
+
+def same_vertices(points: np.ndarray) -> np.ndarray:
+    """The place (V,) of each of points (V, 3) [m], from 0 on, which it shares only with the `SAME`: the two sides of thin cloth, which
+    `welded_vertices` may join, stay apart.
+    """
+    with np.errstate(invalid="ignore"):
+        lattice = np.round(points / SAME).astype(np.int64) @ _MIXED
+    return np.unique(lattice, return_inverse=True)[1]
 
 
 def rays_through(

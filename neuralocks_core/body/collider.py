@@ -7,7 +7,7 @@ import numpy as np
 
 from neuralocks_core.body.tree_search import search, surface_tree
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.mesh import welded_vertices
+from neuralocks_core.mesh import same_vertices, welded_vertices
 
 MOST_SAMPLES = 400_000
 """Bound on the surface samples of one mesh, so that one huge triangle cannot exhaust the memory."""
@@ -134,11 +134,16 @@ class Collider:
 
     @cached_property
     def _pseudonormals(self) -> np.ndarray:
-        """(F, 7, 3): of the face, of corners 0 1 2, of edges 01 12 20."""
+        """Unit vectors (F, 7, 3): of the face, of corners 0 1 2, of edges 01 12 20. Zero where sheets lie on each other, back to back:
+        beyond their rim, nothing is inside.
+        """
         result = np.empty((len(self.triangles), 7, 3))
         result[:, 0] = self._normals
         corners = self.points[self.triangles]
-        at_corner = np.zeros_like(self.points)
+        # Files have a vertex once for each side of a seam or of a hard edge, with that side's normal alone.
+        triangles = same_vertices(self.points)[self.triangles]
+        count = int(triangles.max()) + 1
+        at_corner = np.zeros((count, 3))
 
         def gather(into, values, count):
             return np.stack([np.bincount(into, values[:, axis], count) for axis in range(3)], axis=1)
@@ -146,13 +151,14 @@ class Collider:
         for i in range(3):
             u, v = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
             angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1))
-            at_corner += gather(self.triangles[:, i], angle[:, None] * self._normals, len(self.points))
-        result[:, 1:4] = at_corner[self.triangles]
-        edges = np.sort(self.triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-        key = edges[:, 0] * len(self.points) + edges[:, 1]
-        _, which = np.unique(key, return_inverse=True)
+            at_corner += gather(triangles[:, i], angle[:, None] * self._normals, count)
+        result[:, 1:4] = at_corner[triangles]
+        edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+        _, which = np.unique(edges[:, 0] * count + edges[:, 1], return_inverse=True)
         at_edge = gather(which.ravel(), np.repeat(self._normals, 3, axis=0), which.max() + 1)
         result[:, 4:7] = at_edge[which].reshape(-1, 3, 3)
+        size = np.linalg.norm(result[:, 1:], axis=2, keepdims=True)
+        result[:, 1:] = np.where(size > 1e-9, result[:, 1:], 0) / np.maximum(size, 1e-9)
         return result
 
 

@@ -82,6 +82,28 @@ def test_points_far_beyond_a_sharp_rim_are_not_inside():
     assert Collider(cone.vertices, cone.faces).distance(points, limit=0.02)[0].min() > 0.03
 
 
+def test_hard_edges_and_seams_divide_no_surface():
+    """Files have a vertex once for each face with a normal or a texture of its own: beyond a sharp edge, one of these faces away."""
+    corners = np.array([[x, y * x, z] for z in (0, 0.1) for x, y in ((0, 0), (0.1, 0.1), (0.1, -0.1))])
+    wedge = trimesh.convex.convex_hull(corners)
+    apart = Collider(wedge.triangles.reshape(-1, 3), np.arange(3 * len(wedge.faces)).reshape(-1, 3))
+    points = np.random.default_rng(8).uniform(-0.03, 0.13, (3000, 3))
+    distance = Collider(wedge.vertices, wedge.faces).distance(points, limit=1)[0]
+    np.testing.assert_allclose(apart.distance(points, limit=1)[0], distance, atol=1e-9)
+    on = np.concatenate([wedge.vertices, wedge.triangles[:, :2].mean(axis=1)])
+    distance, direction = apart.distance(on)
+    np.testing.assert_allclose(distance, 0, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, atol=1e-9)
+
+
+def test_a_sheet_with_a_back_encloses_nothing():
+    """Two squares on each other that face away from each other: beside them is air."""
+    square = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]])
+    sheet = Collider(np.concatenate([square, square]), np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]]))
+    beside = np.array([[0.13, 0.05, -0.01], [0.13, 0.05, 0.01], [-0.02, -0.02, -0.02], [-0.02, -0.02, 0.02]])
+    assert (sheet.distance(beside)[0] > 0.02).all()
+
+
 def test_what_lies_beyond_an_open_edge_is_known_and_a_seam_is_none():
     """A square sheet of 2 m that faces up, cut along x = 0, where its corners are there twice."""
     x, y = np.array([-1, 0, 0, 1.0]), np.array([-1, 0, 1.0])
