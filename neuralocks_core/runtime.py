@@ -42,6 +42,8 @@ OUT = {
 }
 CHANGED = {"middle": HIDDEN, "out": SHAPE}
 """Further outputs of the frame graph if it changes the weights of the tail."""
+ROWS = {"frame_part": 1, "middle": HIDDEN, "out": HIDDEN}
+"""Rows of the frame graph's outputs; all other arrays have one a strand."""
 GRAPHS = 24
 """Graphs that stay loaded: of six models. A model that is read again, as for another scene or groom, need not be loaded again."""
 LARGEST = 1e7
@@ -142,7 +144,7 @@ class StrandModel:
         """
         values = self._computed("frame.onnx", list(self._shared), {"frame": self.vector(vector)[None]})
         return {
-            name: self._sane("frame.onnx", value, (1 if name == "frame_part" else HIDDEN, self._shared[name]))
+            name: self._sane("frame.onnx", value, (ROWS[name], self._shared[name]))
             for name, value in zip(self._shared, values)
         }
 
@@ -161,10 +163,10 @@ class StrandModel:
 
     def _rows(self, graph: str, name: str, given) -> np.ndarray:
         """An input of a graph that a caller gives, (n, width) float32."""
-        width = self._reads[graph][name]
-        rows = number_array(name, given, f"(n, {width})", np.float32)
-        if rows.ndim != 2 or rows.shape[1] != width:
-            raise NeuralocksError(f"{name}: is of shape {rows.shape}; {graph} reads (n, {width})")
+        width, count = self._reads[graph][name], ROWS.get(name, "n")
+        rows = number_array(name, given, f"({count}, {width})", np.float32)
+        if rows.ndim != 2 or rows.shape[1] != width or count not in ("n", len(rows)):
+            raise NeuralocksError(f"{name}: is of shape {rows.shape}; {graph} reads ({count}, {width})")
         return rows
 
     def _check_graphs(self) -> None:

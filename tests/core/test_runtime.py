@@ -108,6 +108,11 @@ def test_what_the_network_does_not_read_is_named(path, strands):
         ),
         (
             ("tail.onnx", "offsets"),
+            tail | {"frame_part": np.zeros((2, 256))},
+            r"frame_part: is of shape \(2, 256\); tail.onnx reads \(1, 256\)",
+        ),
+        (
+            ("tail.onnx", "offsets"),
             tail | {"strand_part": np.full((2, 256), np.nan)},
             "strand_part: holds NaN or infinity",
         ),
