@@ -42,9 +42,7 @@ class HairRig:
         who = self.character
         if body is None or not self.in_reach(body).any():
             return replace(self, character=replace(who, body=None))
-        of_head = who.skeleton.below(who.head)[body.joint_indices]
-        head = np.sum(body.joint_weights * of_head, axis=1) > 0.5
-        lids = closed_holes(who.canonical(body.points), body.triangles, head)
+        lids = closed_holes(who.canonical(body.points), body.triangles, replace(who, body=body).on_head)
         body = replace(body, triangles=np.concatenate([body.triangles, lids]))
         return replace(self, character=replace(who, body=body))
 

@@ -8,8 +8,10 @@ import pytest
 import trimesh
 
 from neuralocks_core.mesh import rays_through
-from neuralocks_core.rig import SkinnedMesh
+from neuralocks_core.rig import SkinnedMesh, find_chains
 from neuralocks_core.rig.parting import parted
+from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.skinned_body import Body
 
 from .builders import character, tail
 
@@ -131,6 +133,20 @@ def test_hair_without_a_character_is_hair():
 
 def test_without_meshes_nothing_is_parted():
     assert parted(WHO, [], MOVING) == []
+
+
+def test_a_scalp_that_bones_below_a_copy_of_the_head_move_is_closed():
+    """In a control rig, the bones of the face may hang from a copy of the head's joint."""
+    place = tuple(WHO.skeleton.bind[WHO.head, :3, 3])
+    rows = [("copy", "neck", place), ("face", "copy", (0, 1.6, 0.05)), *tail("hair", 3)]
+    for joint, closed in (("head", True), ("face", True), ("neck", False)):
+        who = character(rows)
+        points, faces = _ball(0.12, CENTRE, lambda points: points[:, 1] < 0.1)
+        index = [name.rsplit("/", 1)[-1] for name in who.skeleton.names].index(joint)
+        body = Body(points, faces, np.full((len(points), 1), index), np.ones((len(points), 1)))
+        chains = find_chains(who)
+        rig = HairRig(who, chains, np.zeros((0, 3)), np.zeros((0, len(chains) + 1)), np.zeros((0, 3), int))
+        assert (len(rig.with_body(body).character.body.triangles) > len(faces)) == closed
 
 
 def test_rays_pass_through_what_lies_ahead():
