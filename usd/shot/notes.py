@@ -189,7 +189,7 @@ def unlikely_head(rig: StageRig) -> list[str]:
 def another_head(rig: StageRig) -> list[str]:
     """The note on hair joints of a second character in the skeleton, if no bake moves them."""
     names, character, moved = rig.source.names, rig.character, rig.source.baked_hair
-    for joint in np.flatnonzero(~character.skeleton.below(character.head)):
+    for joint in np.flatnonzero(~character.of_head):
         heads = heads_above(character, joint)
         if heads and says_hair(character.own_names[joint]) and names[joint] not in moved:
             return [

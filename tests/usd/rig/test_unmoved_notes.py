@@ -46,6 +46,23 @@ def test_hair_that_hangs_beside_the_head_is_told(edited, tmp_path, above, lock, 
         assert [note for note in notes if " not moved; " in note] == ([f"/Who/Rig: {told}"] if told else [])
 
 
+def test_hair_below_a_copy_of_the_head_is_moved(edited):
+    """As in a control rig, where the copy is often named like a head, too: it is no second head."""
+
+    def change(stage):
+        copy = "hips/ORG_head"
+        _named("hips", "hips/head", copy, f"{copy}/hair_0", f"{copy}/hair_0/hair_1", f"{copy}/hair_0/hair_1/end")(stage)
+        places = stage.GetPrimAtPath("/Who/Rig").GetAttribute("bindTransforms")
+        hips, head, _, *hair = places.Get()
+        places.Set([hips, head, head, *hair])
+        UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set([1] * 3 + [3] * 3 + [4] * 3)
+
+    hair = read_rigged_hair(edited(change))
+    assert hair.source.character.skeleton.names[hair.source.character.head] == "hips/head"
+    assert hair.rig.chains.names == ("hair_0", "hair_1")
+    assert not [note for note in rigged_notes(hair.source) if "not moved" in note]
+
+
 def test_no_joint_is_told_because_of_the_rigs_name(edited):
     """`Pony` means hair wherever a joint hangs."""
     joints = (
