@@ -36,6 +36,8 @@ class Stencils:
         clip, moving = item.attachment.rig.time_codes, item.placement.samples
         rig, border = item.attachment.rig, item.attachment.rig.border
         self._first, self._last = min([clip[0], *moving[:1]]), max([clip[-1], *moving[-1:]])
+        if blown and self._first == self._last:  # the body never moves, so no time differs from others
+            self._last = -np.inf
         after = np.searchsorted(rig.clip.times, rig.clip.cuts - 1e-9)
         self._before, self._after = clip[after - 1], clip[after]
         self._blown = blown

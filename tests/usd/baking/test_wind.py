@@ -166,6 +166,17 @@ def test_wind_moves_the_hair_of_a_character_without_an_animation(tmp_path, model
     assert inspect(shot)["stops"] and not inspect(out)["stops"]
 
 
+def test_velocities_of_hair_that_only_a_wind_moves_are_those_of_its_points_in_every_frame(tmp_path):
+    """Time code 0, at which a character without an animation is read, is a frame like any other."""
+    shot, model = write_shot(tmp_path, Recipe(frames=0)), write_random_model(tmp_path / "lively.neuralocks", gain=8.0)
+    out = bake(shot, tmp_path / "blown.usdc", model, frames="-3:3", wind=(4, 0, -4), gusts=1).path
+    at = {code: samples(out, "points", at=code).astype(float) for code in range(-3, 4)}
+    for code in (-1, 0, 1):
+        central = (8 * (at[code + 1] - at[code - 1]) - (at[code + 2] - at[code - 2])) * 24 / 12
+        assert np.abs(central).max() > 1e-3
+        assert np.allclose(samples(out, "velocities", at=code), central, atol=1e-4)
+
+
 def test_hair_that_feels_no_wind_refuses_it(tmp_path):
     still = write_random_model(tmp_path / "held.neuralocks", gain=1.0, spec=BoundarySpec(bins=()))
     with pytest.raises(NeuralocksError, match="wind: this model is for held poses"):
