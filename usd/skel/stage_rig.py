@@ -18,6 +18,7 @@ from neuralocks_core.motion import LOOP_GAP, Clip, loop_turns
 from ..border.units import Border
 from .bind_world import bind_shown
 from .blend_shapes import all_shares
+from .clip_codes import SAME
 from .joints import JointSource
 from .motion_sketch import motion_sketch
 from .skin import Skin
@@ -181,8 +182,9 @@ class StageRig:
     @cached_property
     def _repeated(self) -> slice:
         """Samples of the clip that are in a loop."""
-        body = self.source.keys.body or self.time_codes
-        return slice(*np.searchsorted(self.time_codes, [body[0] - 1e-9, body[-1] + 1e-9]))
+        body, same = self.source.keys.body or self.time_codes, SAME * self.border.frame
+        # Of what is keyed together, the clip has the latest.
+        return slice(*np.searchsorted(self.time_codes, [body[0] - same, body[-1] + same], side="right"))
 
     @cached_property
     def carried(self) -> dict[int, Character]:

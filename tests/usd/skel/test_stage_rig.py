@@ -16,7 +16,7 @@ from usd.shot.notes import out_of_range
 from usd.shot.stage import read_rigs, read_shot
 from usd.skel.source import find_skeletons
 
-from ..shots import Recipe, write_shot
+from ..shots import Recipe, write_loop, write_shot
 
 
 def test_a_rate_of_its_own_gives_seconds_of_its_own(tmp_path):
@@ -80,6 +80,16 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     turned[:, -1, :3, :3] = 0  # a joint that hides its children
     (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
     assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note
+
+
+def test_a_loop_ends_with_its_last_sample_whatever_rounded_the_range_of_its_shot(tmp_path):
+    shot = write_loop(tmp_path)
+    stage = Usd.Stage.Open(str(shot))
+    stage.SetEndTimeCode(13.00002)
+    stage.Save()
+    rig = read_rigs(shot)[0]
+    assert len(rig.cycle.times) == 13 and rig.cycle.times[-1] == pytest.approx(13 / 24, abs=1e-5)
+    assert not rig.loop_notes()
 
 
 CURVE = ((1, 0.0), (5, 80.0), (9, 20.0))
