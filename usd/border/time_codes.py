@@ -54,7 +54,7 @@ def time_codes(frames, first: float, last: float, subframes: int = 1, frame: flo
     if frames is None or isinstance(frames, str):
         begin, end, step = _whole_range(first, last, frame, samples) if frames is None else parse_frames(frames, frame)
         begin, end = on_frame(begin, first, frame), on_frame(end, first, frame)
-        count = (end - begin) / step + 1e-6  # may overflow to infinity
+        count = (end - begin) / step + (NEAR if frames is None else 1e-6)  # may overflow to infinity
         if not count * subframes < MOST:
             raise NeuralocksError(f"frames: more than {MOST} samples; give fewer with --frames FIRST:LAST:STEP")
         count = math.floor(count) + 1
@@ -99,7 +99,7 @@ def _whole_range(first: float, last: float, frame: float, samples) -> tuple[floa
     # If a time code is a frame, frames are whole numbers, unless the animation has all its samples between them, as the range begins;
     # otherwise the shot begins with a frame.
     between = _off(first) > NEAR and len(samples) > 0 and all(_off(code - first) < NEAR for code in samples)
-    begin = float(math.ceil(first - 1e-9)) if frame == 1 and not between else first
+    begin = float(math.ceil(first - NEAR)) if frame == 1 and not between else first
     return begin, max(last, begin), frame
 
 

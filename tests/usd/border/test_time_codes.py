@@ -20,6 +20,8 @@ def test_a_range_left_out_is_the_shots_in_its_own_frames():
     assert time_codes(None, 0.5, 3.2) == [1.0, 2.0, 3.0] == time_codes(None, 0.5, 3.2, samples=[0.5, 1.0, 1.5])
     assert time_codes(None, 0.5, 3.2, samples=[-1.5, 0.5, 2.5]) == [0.5, 1.5, 2.5], "keys lie as the range begins"
     assert time_codes(None, 2.2, 2.4) == [3.0]
+    assert time_codes(None, 1.00001, 3.99999) == [1, 2, 3, 4], "ends that were rounded"
+    assert time_codes(None, 0.5, 2.49999, samples=[0.5, 1.5, 2.5]) == [0.5, 1.5, 2.5]
     assert time_codes((1, 24, 48), 1, 48) == [1.0, 24.0, 48.0]
     assert time_codes(None, 2, 3, subframes=2) == [2.0, 2.5, 3.0, 3.5]
     assert np.allclose(time_codes(None, 0.25, 0.5, frame=1 / 24), np.arange(6, 13) / 24)
