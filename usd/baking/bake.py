@@ -17,7 +17,6 @@ from neuralocks_core.wind import check_felt
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
-from ..border.time_codes import given_cuts
 from ..shot.recorded import given_facts
 from ..shot.stage import StageGroom
 from ..shot.wind import as_wind, in_core, wind_facts
@@ -92,8 +91,8 @@ def bake(
     check_number("--strength", strength, 0, 4)
     blown = as_wind(wind, gusts)
     check_felt(blown is None or groom_models.asked.feels_wind)
-    cuts = given_cuts(cuts, loop)
-    shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
+    how = {"grooms": grooms, "skeleton": skeleton, "head": head, "joints": joints}
+    shot, codes = read_asked(shot, how, cuts, loop, frames, subframes, blown, progress)
     options = {"strength": float(strength), "resolve": resolve, "loop": loop}
     models = groom_models.each(shot.grooms)
     digests = {item.path: digest_of(each) for each, items in models for item in items}
@@ -102,15 +101,15 @@ def bake(
     def poser(items: list[StageGroom]) -> GroomPoser:
         return GroomPoser(items, groom_models.of(items[0]), look, wind=in_core(blown, shot.border), **options)
 
-    alike = {"material": asdict(look), **options}
-    alike |= wind_facts(blown) | given_facts(cuts, joints)
+    alike = {"material": asdict(look), **options, **wind_facts(blown)}
 
     def facts(item: StageGroom) -> dict:
-        return {"model": digests[item.path][:RECORDED], **alike}
+        given = given_facts(shot.given_cuts(item.attachment.rig), shot.joints)
+        return {"model": digests[item.path][:RECORDED], **alike, **given}
 
     moved = [(each, [item.attachment for item in items]) for each, items in models]
     untrue = {note for each in moved for note in learned(*each)}
-    known = known_notes(shot, codes, loop, (loop or cuts is None) and bool(groom_models.asked.spec.bins))
+    known = known_notes(shot, codes, loop, (loop or shot.cuts is None) and bool(groom_models.asked.spec.bins))
     notes = [
         *(note for note in known if note not in untrue),
         *dict.fromkeys(note for each, its in moved for note in model_notes(each, look, its, strength)),

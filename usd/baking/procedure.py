@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.wind import Wind
 
-from ..border.time_codes import time_codes
+from ..border.time_codes import given_cuts, time_codes
 from ..shot.also_changed import also_changed
 from ..shot.curves import find_curves
 from ..shot.gaps import hidden
@@ -42,12 +43,21 @@ class BakeResult:
 
 
 def read_asked(
-    shot, grooms, skeleton, head, joints, cuts, frames, subframes: int, wind: Wind | None, progress: Progress | None
+    shot, how: dict, cuts, loop: bool, frames, subframes: int, wind: Wind | None, progress: Progress | None
 ) -> tuple[Shot, list[float]]:
-    """The shot, read if it is not yet, and the time codes asked for; arguments as for `bake`."""
+    """The shot, read if it is not yet, and the time codes asked for; arguments as for `bake`.
+
+    Raises:
+        NeuralocksError: the shot cannot be read, or was read already and `how` or the cuts say how; there are no such frames.
+    """
     (progress or silent)(0, 1, "reading the shot")  # for a crowd, this takes longer than a user waits without a message
-    if not isinstance(shot, Shot):
-        shot = read_shot(shot, grooms, skeleton, head, joints, cuts, still=wind is not None)
+    if isinstance(shot, Shot):
+        if late := [name for name, value in {**how, "cuts": cuts}.items() if value is not None]:
+            raise NeuralocksError(f"{shot.path}: is read already, so '{late[0]}' comes too late; give it to read_shot")
+        for rig in shot.rigs:
+            given_cuts(shot.given_cuts(rig), loop)
+    else:
+        shot = read_shot(shot, **how, cuts=given_cuts(cuts, loop), still=wind is not None)
     check_frames_named(shot.path, frames, shot.first, shot.last, shot.rigs)
     samples = [code for rig in shot.rigs for code in rig.source.keys.every]
     return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame, samples)

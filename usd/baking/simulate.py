@@ -22,7 +22,6 @@ from neuralocks_core.warp_device import start_warp
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
-from ..border.time_codes import given_cuts
 from ..shot.recorded import given_facts
 from ..shot.stage import StageGroom
 from ..shot.wind import as_wind, in_core, wind_facts
@@ -92,9 +91,9 @@ def simulate(
             raise NeuralocksError(f"--volume {volume:g}: XPBD keeps no strands apart; leave out --volume or --xpbd")
     loop = flag("--loop", loop)
     blown = as_wind(wind, gusts)
-    cuts = given_cuts(cuts, loop)
     _check_device(device)
-    shot, codes = read_asked(shot, grooms, skeleton, head, joints, cuts, frames, subframes, blown, progress)
+    how = {"grooms": grooms, "skeleton": skeleton, "head": head, "joints": joints}
+    shot, codes = read_asked(shot, how, cuts, loop, frames, subframes, blown, progress)
     options = {"volume": float(volume), "loop": loop}
     solver = _solver_facts(xpbd, device)
     inputs = {"material": asdict(look), "wind": blown and asdict(blown), "codes": codes, "strands": count}
@@ -107,15 +106,18 @@ def simulate(
         wind = in_core(blown, shot.border)
         return _SimulatedPoser(item, codes, shot.first, look, count, wind=wind, loop=loop, **how)
 
-    facts = {**solver, "material": asdict(look), "strands": count, **options}
-    facts |= wind_facts(blown) | given_facts(cuts, joints)
-    notes = known_notes(shot, codes, loop, loop or cuts is None)
+    alike = {**solver, "material": asdict(look), "strands": count, **options, **wind_facts(blown)}
+
+    def facts(item: StageGroom) -> dict:
+        return alike | given_facts(shot.given_cuts(item.attachment.rig), shot.joints)
+
+    notes = known_notes(shot, codes, loop, loop or shot.cuts is None)
     if xpbd and look.clumping != Material().clumping:
         notes.append("XPBD does not tie the strands of a lock together: the material's clumping does nothing")
 
     def write() -> int:
         how = {"blown": blown is not None, "progress": progress}
-        return write_samples(shot, out, codes, poser, inputs, lambda item: facts, **how)
+        return write_samples(shot, out, codes, poser, inputs, facts, **how)
 
     result = write_told(notes, tell, began, shot, out, codes, write)
     return replace(result, residual=None if xpbd else _summary(residuals))

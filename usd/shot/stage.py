@@ -15,7 +15,7 @@ from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.prim_paths import prim_path
 from ..border.stage_files import open_stage
-from ..border.time_codes import NEAR
+from ..border.time_codes import NEAR, given_cuts
 from ..border.units import Border
 from ..skel.cut_samples import within
 from ..skel.source import find_skeletons
@@ -85,6 +85,7 @@ class Shot:
         grooms: those to deform.
         first, last: frame range in time codes.
         notes: what a user should know, one line each.
+        joints, cuts: as they were given to `read_shot`.
     """
 
     path: Path
@@ -95,6 +96,12 @@ class Shot:
     first: float
     last: float
     notes: tuple[str, ...]
+    joints: dict[str, str] | None = None
+    cuts: list[float] | dict[str, list[float]] | None = None
+
+    def given_cuts(self, rig: StageRig) -> list[float] | None:
+        """The cuts that were given for a skeleton."""
+        return self.cuts.get(rig.path) if isinstance(self.cuts, dict) else self.cuts
 
 
 @names_damage
@@ -117,6 +124,7 @@ def read_shot(
         NeuralocksError: what stops a bake, with the prim and the remedy.
     """
     path, skeleton = as_path(path, "shot"), prim_path(skeleton, "skeleton")
+    cuts = cuts if isinstance(cuts, dict) else given_cuts(cuts)
     stage = open_stage(path)
     border = Border.of(stage)
     notes = composition_notes(stage, path) + layer_notes(stage, path)
@@ -160,6 +168,8 @@ def read_shot(
         first=first,
         last=last,
         notes=tuple(dict.fromkeys(notes)),
+        joints=joints,
+        cuts=cuts,
     )
 
 

@@ -16,6 +16,7 @@ from usd.review.baked import read_baked
 from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.shot.recorded import recorded
+from usd.shot.stage import read_shot
 
 from ..shots import Recipe, samples, write_loop, write_shot
 
@@ -49,6 +50,23 @@ def bakes(shots, model):
     return {
         name: bake(shot, whole.with_name(f"{name}.usdc"), model, cuts=cuts) for name, (shot, cuts) in wanted.items()
     }
+
+
+def test_a_shot_that_was_read_has_its_cuts_and_joints(shots, bakes, model, tmp_path):
+    """Given to the bake instead, they would be recorded, but not used."""
+    path = shots[0]
+    with pytest.raises(NeuralocksError, match="is read already, so 'cuts' comes too late; give it to read_shot"):
+        bake(read_shot(path), tmp_path / "late.usdc", model, cuts=[])
+    read = read_shot(path, joints={"neck": "neck"}, cuts=np.array([CUT]))
+    with pytest.raises(NeuralocksError, match="a loop has none"):
+        bake(read, tmp_path / "loop.usdc", model, loop=True)
+    out = bake(read, tmp_path / "read.usdc", model, frames=[CUT]).path
+    again = bake(read_baked(out).shot, tmp_path / "again.usdc", model, frames=[CUT]).path
+    stages = [Usd.Stage.Open(str(path)) for path in (out, again)]
+    first, second = (recorded(stage.GetPrimAtPath("/Hero/Hair")) for stage in stages)
+    assert first["cuts"] == second["cuts"] == [CUT] and first["joints"] == {"neck": "neck"}
+    given = samples(bakes["given"].path, "points", at=CUT)
+    np.testing.assert_array_equal(samples(out, "points", at=CUT), given)
 
 
 def test_hair_starts_anew_after_a_cut(bakes):
