@@ -63,6 +63,7 @@ class Material:
     def __post_init__(self):
         for name, value in asdict(self).items():
             _check(name, value, name)
+            object.__setattr__(self, name, float(value))  # plain, as files of USD and JSON take it
 
     def log_ratios(self) -> np.ndarray:
         """(4,) float32: logarithms of the ratios to the default material, as the network reads them; zero for the default."""
