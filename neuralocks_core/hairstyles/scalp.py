@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.mesh import across, vertex_normals
+from neuralocks_core.mesh import across, vertex_normals, welded_vertices
 from neuralocks_core.rotation import unit
 
 # The hairline seen from the side: (forward, up). Forward is -1 at the back of the skull and 1 at the
@@ -97,11 +97,12 @@ class Scalp:
 
     def _border_distance(self, places: np.ndarray) -> np.ndarray:
         """(N,) distance [m] to the scalp's edge; large if it has none."""
-        edges = np.sort(
-            np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
-        )
+        # Files split a skin along texture seams, where hair grows as elsewhere.
+        first, place = welded_vertices(self.points)
+        triangles = first[place][self.triangles]
+        edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]))
         edge, uses = np.unique(edges, axis=0, return_counts=True)
-        edge = edge[uses == 1]
+        edge = edge[(uses == 1) & (edge[:, 0] < edge[:, 1])]
         if not len(edge):
             return np.full(len(places), np.inf)
         share = np.linspace(0.0, 1.0, 8)[:, None, None]

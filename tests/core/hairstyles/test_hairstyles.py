@@ -153,6 +153,21 @@ def test_roots_cover_the_scalp_evenly():
     assert ((roots.normal * (roots.place - CENTRE)).sum(axis=1) > 0.08).all()
 
 
+def test_no_hairline_runs_along_the_seams_of_a_file():
+    """Files split a skin along texture seams, and per face if it is flat-shaded: hair thinned out there, as at the hairline."""
+    whole = SCALP.roots(500, np.random.default_rng(0))
+    left = SCALP.points[SCALP.triangles].mean(axis=1)[:, 0] < 0
+    seamed = np.where(left[:, None], SCALP.triangles + len(SCALP.points), SCALP.triangles)
+    apart = SCALP.points[SCALP.triangles].reshape(-1, 3)
+    for points, triangles in (
+        (np.concatenate([SCALP.points, SCALP.points]), seamed),
+        (apart, np.arange(len(apart)).reshape(-1, 3)),
+    ):
+        split = Scalp(points, triangles, CENTRE).roots(500, np.random.default_rng(0))
+        np.testing.assert_allclose(split.border, whole.border, atol=1e-12)
+        np.testing.assert_allclose(split.place, whole.place, atol=1e-12)
+
+
 def test_a_scalp_is_marked_on_a_bare_head():
     _, (points, triangles) = ball_scalp()
     scalp = from_head(points, triangles, CENTRE)
