@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -53,19 +54,19 @@ class Scalp:
         if not self.area > 1e-6:
             raise NeuralocksError(f"scalp: its area is {self.area:g} m^2; mark a larger one or check the unit")
 
-    @property
+    @cached_property
     def area(self) -> float:
         """[m^2]."""
         return float(self._areas.sum())
 
-    @property
+    @cached_property
     def radius(self) -> float:
         """Size of the head [m]: mean distance of the scalp from the head's centre, about 0.1 for an adult."""
         middle = self.points[self.triangles].mean(axis=1)
         distance = np.linalg.norm(middle - self.head_centre, axis=1)
         return float(np.average(distance, weights=self._areas))
 
-    @property
+    @cached_property
     def _areas(self) -> np.ndarray:
         return np.linalg.norm(across(self.points[self.triangles]), axis=1) / 2
 
