@@ -93,7 +93,7 @@ def _still(scene: Scene, frames, turntable: bool) -> np.ndarray:
     """Frames of a strip, of those that are asked for."""
     if frames is None:  # but the first and the last, which often show the rest pose
         places = np.linspace(0, len(scene.times) - 1, PANELS + 2)[1:-1]
-        return np.unique(places.round().astype(int))
+        frames = np.unique(places.round().astype(int))
     if turntable and len(frames) == 1:
         return np.full(PANELS, frames[0])
     if len(frames) <= MOST_PANELS:

@@ -108,6 +108,14 @@ def test_a_strip_of_a_turntable_names_the_side_as_well(hair, tmp_path, monkeypat
     assert named == [f"frame 6, {angle}°" for angle in (-30, 30, 90, 150, 210, 270)]
 
 
+def test_a_turntable_goes_round_a_bake_of_one_sample_too(tmp_path, monkeypatch):
+    named, path = [], write_shot(tmp_path, Recipe(strands=4))
+    monkeypatch.setattr(picture.drawing, "_strip", lambda part, images, names: (named.extend(names), part.touch()))
+    bake(path, tmp_path / "hair.usda", frames="3")
+    picture.preview(tmp_path / "hair.usda", tmp_path / "hair.png", turntable=True, view=0, size=(32, 40))
+    assert named == [f"frame 3, {angle}°" for angle in (0, 60, 120, 180, 240, 300)]
+
+
 def test_a_turntable_goes_once_round_a_single_frame_and_shows_other_sides(hair, tmp_path):
     from PIL import Image
 
