@@ -61,7 +61,8 @@ def read_usd(source: Path, out: Path, unit, up, grooms, sized: bool, onto: bool)
     notes += [] if sized or unit is not None else unit_notes(stage, source)
     every = find_curves(stage, grooms)
     hair = open_curves(every)
-    closed, empty = [prim for prim in every if prim not in hair], without_points(hair)
+    kept, empty = {*hair}, without_points(hair)  # a set: some exporters write a prim for each of thousands of strands
+    closed = [prim for prim in every if prim not in kept]
     notes += few(
         [
             f"{prim.GetPath()}: its curves are closed, as a rig's controls are; left out: set their wrap to pinned if they are hair"

@@ -69,6 +69,19 @@ def test_the_hair_of_one_character_is_taken_as_a_bake_tells_it_from_other_curves
     assert len(every) == 3, "where nothing is put on a head, all curves are imported"
 
 
+def test_curves_are_not_compared_each_with_all_others(tmp_path, monkeypatch):
+    """Where a prim holds a single strand, there are thousands."""
+    stage, same, asked = Usd.Stage.CreateNew(str(tmp_path / "many.usda")), Usd.Prim.__eq__, []
+    for number in range(80):
+        curves = UsdGeom.BasisCurves.Define(stage, f"/Hair_{number}")
+        curves.CreateCurveVertexCountsAttr([2])
+        curves.CreatePointsAttr([(0, number, 0), (1, number, 0)])
+    stage.Save()
+    monkeypatch.setattr(Usd.Prim, "__eq__", lambda one, other: asked.append(one) or same(one, other))
+    assert len(import_groom(tmp_path / "many.usda", tmp_path / "out.usda", unit="cm")[0]) == 80
+    assert len(asked) < 10 * 80
+
+
 def test_what_is_said_to_be_left_out_is_left_out_where_it_is_named(tmp_path):
     path = write_shot(tmp_path, Recipe(bound="mesh"))
     stage = Usd.Stage.Open(str(path))
