@@ -19,8 +19,10 @@ VELOCITY = "velocity"
 
 
 def begin(hair, scene) -> None:
-    """Give moved hair a modifier that only takes its velocities off, for the duration of a render."""
-    if hair.library is not None or not curves.has_rest(hair.data):
+    """Give moved hair a modifier that only takes its velocities off, for the duration of a render; one, however many of the scenes that
+    are drawn have the hair.
+    """
+    if hair.library is not None or not curves.has_rest(hair.data) or NAME in hair.modifiers:
         return
     if has_velocities(hair) or not hair.is_deform_modified(scene, "RENDER"):
         modifier = hair.modifiers.new(NAME, "NODES")
