@@ -186,12 +186,12 @@ def _in_step(scene) -> str:
 
 def _cache_file(path: str):
     """The data block of a cache file; only the open operator makes one."""
-    known = {c.name for c in bpy.data.cache_files}
+    known = set(bpy.data.cache_files)  # one of a library may have the new one's name
     for cache in bpy.data.cache_files:
         if _is(cache, path):
             return cache
     bpy.ops.cachefile.open(filepath=path)
-    cache = next(c for c in bpy.data.cache_files if c.name not in known)
+    cache = next(c for c in bpy.data.cache_files if c not in known)
     cache.user_clear()  # the operator counts a user that does not exist, and the block would outlast its modifiers
     cache.filepath = named_here(path)
     return cache

@@ -120,7 +120,7 @@ def set_in_a_shot(folder: Path) -> None:
 
 def cached_in_a_shot(folder: Path) -> None:
     """A cache that hair has from its library, removed in a shot, stays off when the shot is reopened, as does one that the shot
-    gave the hair instead; what moves the hair without it is on.
+    gave the hair instead, from a file of the same name; what moves the hair without it is on.
     """
     needs_usd()
     rig, strands = scenes.dancer(20)
@@ -152,13 +152,13 @@ def cached_in_a_shot(folder: Path) -> None:
         assert [cache.name_full.partition(" ")[0] for cache in bpy.data.cache_files] == ["library.usdc"]
         assert apart(points_at(strands, 1010), still) < 1e-6, file
         if file == "library":
-            assert bpy.ops.neuralocks.bake_attach(filepath="//shot.usdc") == {"FINISHED"}
+            assert bpy.ops.neuralocks.bake_attach(filepath="//shot/library.usdc") == {"FINISHED"}
             cached = points_at(strands, 1010)
             _opened_again(folder)
             strands = _own("CURVES")
             assert on(strands) == {blur: True, "Neuralocks Cache": True, deform: False}
             assert apart(points_at(strands, 1010), cached) < 1e-6
-            assert apart(cached, baked_points(folder / "shot.usdc", "/Character/Hair_Hair", 1010)) < SAME
+            assert apart(cached, baked_points(folder / "shot" / "library.usdc", "/Character/Hair_Hair", 1010)) < SAME
 
 
 def _keyed_library(folder: Path):
