@@ -158,13 +158,16 @@ def weighed(mesh_object) -> Iterator[None]:
 
 
 def _weighed(mesh, groups: tuple[str, ...]) -> Iterator[None]:
-    """Put the weights of a mesh into the session, step by step; only if some of them, or the groups, differ from those there."""
+    """Put the weights of a mesh into the session, step by step; only if some of them, or the groups, differ from those there. Scripts can
+    leave weights of groups that do not exist, which Blender passes over.
+    """
     probe = _probe(mesh, groups)
     name, edits, rows = mesh.name_full, session.edits, []
     if name in session.weights and session.weights[name][0] == probe:
         return
     for first in range(0, len(mesh.vertices), WEIGHED):
-        rows += [(v.index, g.group, g.weight) for v in mesh.vertices[first : first + WEIGHED] for g in v.groups]
+        some = mesh.vertices[first : first + WEIGHED]
+        rows += [(v.index, g.group, g.weight) for v in some for g in v.groups if g.group < len(groups)]
         yield
     if edits == session.edits:  # otherwise they were edited in between and are read again
         session.weights[name] = probe, np.array(rows, float).reshape(-1, 3)

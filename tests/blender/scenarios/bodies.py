@@ -17,7 +17,7 @@ from tests.blender.checks import SAME, apart, baked_points, body_sampled, choose
 
 def body_as_drawn(_folder: Path) -> None:
     """The body that hair is kept out of is the one that Blender draws: with half of it from a mirror modifier, shape keys limited
-    to a vertex group, and groups named like bones that deform nothing.
+    to a vertex group, groups named like bones that deform nothing, and weights of groups that do not exist.
     """
     scene, rig = bpy.context.scene, scenes.armature(bones=(*scenes.BONES, ("scalp", "head", (0, 0.5, 1), (0, 0.6, 1))))
     rig.data.bones["scalp"].use_deform = False
@@ -41,6 +41,9 @@ def body_as_drawn(_folder: Path) -> None:
     half_of = bmesh.new()
     half_of.from_mesh(body.data)
     bmesh.ops.delete(half_of, geom=[v for v in half_of.verts if v.index in right], context="VERTS")
+    weights = half_of.verts.layers.deform.verify()
+    for vertex in half_of.verts:
+        vertex[weights][77] = 1.0
     half_of.to_mesh(body.data)
     half_of.free()
     half = len(body.data.vertices)
