@@ -29,6 +29,8 @@ WORDS = (
     ("go on with --resume", "try again"),
     ("leave out --loop", "turn Loop off"),
     ("check the stage's metersPerUnit", "check the scene's Unit Scale"),
+    ("check the file's metersPerUnit and upAxis", "check the scene's Unit Scale"),
+    ("check metersPerUnit and the character's scale", "check the scene's Unit Scale and the character's scale"),
     ("its skel binding puts its roots", "where its object stands in the rest pose, its roots are"),
     ("check its unit and primvars:skel:geomBindTransform", "check the object's place and scale, and its parent's"),
     ("no joint found for ", "no bone found for "),
@@ -40,7 +42,10 @@ WORDS = (
 """What the command line says, and what the panel says instead; applied in this order."""
 _CUTS = re.compile(r", or name them all if they are \(--cuts [^)]*\)")
 _RATE = re.compile(r"train with a smaller --set rate(?: than \S+)?")
+_MEANING = re.compile(r"; check --joint \S+")
 """Remedies that the panel does not have."""
+_REFERENCE = re.compile(r"let the hair start anew there \(--cuts [^)]*\)")
+"""One for which it has another: what is before the scene's range is not sampled."""
 
 _JOINT = re.compile(r"joint '(?:[^']*/)?([^'/]+)'")
 """A bone as it is written to a file, with all bones above it."""
@@ -50,7 +55,8 @@ def for_the_panel(text: str) -> str:
     """The line of an error or a note, without options and commands of a terminal."""
     for said, shown in WORDS:
         text = text.replace(said, shown)
-    return _JOINT.sub(r"bone '\1'", _RATE.sub("train again", _CUTS.sub("", text)))
+    text = _REFERENCE.sub("begin the scene's frame range there", _MEANING.sub("", _CUTS.sub("", text)))
+    return _JOINT.sub(r"bone '\1'", _RATE.sub("train again", text))
 
 
 def with_objects(text: str, prims: dict[str, str]) -> str:
