@@ -99,4 +99,15 @@ def test_the_nearest_rotation(noise):
     transforms = np.tile(np.eye(4), (200, 1, 1))
     transforms[:, :3, :3] = linear * rng.uniform(0.5, 2, (200, 1, 3))
     u, _, vt = np.linalg.svd(linear / np.linalg.norm(linear, axis=1, keepdims=True))
-    np.testing.assert_allclose(rotation.rotation_part(transforms), u @ vt, atol=1e-13)
+    np.testing.assert_allclose(rotation.rotation_part(transforms), u @ vt, rtol=0, atol=1e-13)
+
+
+def test_a_size_is_shown_relative_to_that_of_the_bind_pose():
+    """A rig in centimetres, whose head grows in the middle of a shot only."""
+    bind = np.diag([100.0, 100.0, 100.0, 1.0])
+    posed = np.tile(bind, (60, 1, 1))
+    posed[:, :3, 3] = np.arange(60)[:, None]
+    assert rotation.sizes_shown(posed, bind) == pytest.approx(1.0)
+    posed[15:45, :3, :3] *= 2
+    shown = rotation.sizes_shown(posed, bind)
+    assert {round(each, 6) for each in shown} == {1.0, 2.0} and 0.4 < np.mean(shown > 1.5) < 0.6
