@@ -11,7 +11,6 @@ from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import body_measures
-from neuralocks_core.network_sizes import CODE
 from tests.core.rigs import person
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
@@ -19,12 +18,11 @@ pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.runtime import StrandModel
-from neuralocks_core.training import checkpoint, methods, regression
+from neuralocks_core.training import checkpoint, methods
 from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
-from neuralocks_core.training.regression import RolloutBank
 from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import RolloutMaker, held_out_split, in_steps, kept_from_training
+from neuralocks_core.training.rollouts import RolloutMaker, held_out_split, kept_from_training
 from neuralocks_core.training.train import train_strands
 from neuralocks_core.training.work import claimed
 
@@ -62,42 +60,6 @@ def test_rollouts_start_at_rest_and_move(scene):
     assert np.abs(moved[3] - moved[0]).max() < 1e-3
     assert np.abs(rollout.vectors[0, scene.spec.slices["history"]]).max() < 1e-6
     assert np.abs(moved - moved[0]).max() > 1e-2
-
-
-def test_hair_that_moves_by_metres_is_learned_as_it_moved(scene):
-    rollout = RolloutMaker(scene).make(5)
-    far = 40.0 * rollout.moved.astype(np.float32) * rollout.step
-    assert np.abs(far).max() > 2.0
-    moved, step = in_steps(far)
-    bank = RolloutBank(scene, lambda strands: np.zeros((len(strands.rest), CODE), np.float32))
-    bank.rollouts = [replace(rollout, moved=moved, step=step)]
-    batch = bank.batch(np.random.default_rng(0), RegressionOptions(clips=60, moments=60, strands=64))
-    assert batch["moved"].abs().max().item() == pytest.approx(np.abs(far).max(), rel=0.05)
-    assert np.abs(moved * step - far).max() <= 0.51 * step
-    assert step <= np.abs(far).max() / 16000
-
-
-def test_later_rollouts_replace_earlier_ones_and_a_resumed_training_has_the_same(scene, tmp_path, monkeypatch):
-    """In memory and on disk: hours of simulations fit into neither. The first ones stay, for the inputs' scale comes from them."""
-    monkeypatch.setattr(regression, "MOST", 5)
-    monkeypatch.setattr(regression, "FIRST", 2)
-    maker, files = RolloutMaker(scene), [tmp_path / f"{number:06d}.npz" for number in range(8)]
-    for number, path in enumerate(files):
-        save(path, maker.make(number))
-
-    def bank():
-        return RolloutBank(scene, lambda strands: np.zeros((len(strands.rest), CODE), np.float32))
-
-    grown, again = bank(), bank()
-    for some in (files[:3], files[:6], files):
-        grown.add(some)
-    again.add(files)
-    assert grown.read == again.read == 8
-    assert [path.stat().st_size > 0 for path in files] == [n in (0, 1, 5, 6, 7) for n in range(8)]
-    for each in (grown, again):
-        assert [rollout.moved.sum() for rollout in each.rollouts] == [
-            maker.make(n).moved.sum() for n in (0, 1, 5, 6, 7)
-        ]
 
 
 def test_another_history_reads_the_same_simulation(scene):

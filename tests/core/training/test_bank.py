@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rollouts in memory, and what a step of the regression is given of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from neuralocks_core.deformation.strand_session import strand_inputs
+from neuralocks_core.network_sizes import CODE
+
+pytest.importorskip("torch", reason="the extra 'train' is not installed")
+pytest.importorskip("warp", reason="the extra 'train' is not installed")
+from neuralocks_core.training import regression
+from neuralocks_core.training.farm import save
+from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_vectors
+from neuralocks_core.training.regression import RolloutBank
+from neuralocks_core.training.regression_options import RegressionOptions
+from neuralocks_core.training.rollouts import RolloutMaker, in_steps
+
+
+def test_hair_that_moves_by_metres_is_learned_as_it_moved(scene):
+    rollout = RolloutMaker(scene).make(5)
+    far = 40.0 * rollout.moved.astype(np.float32) * rollout.step
+    assert np.abs(far).max() > 2.0
+    moved, step = in_steps(far)
+    bank = RolloutBank(scene, lambda strands: np.zeros((len(strands.rest), CODE), np.float32))
+    bank.rollouts = [replace(rollout, moved=moved, step=step)]
+    batch = bank.batch(np.random.default_rng(0), RegressionOptions(clips=60, moments=60, strands=64))
+    assert batch["moved"].abs().max().item() == pytest.approx(np.abs(far).max(), rel=0.05)
+    assert np.abs(moved * step - far).max() <= 0.51 * step
+    assert step <= np.abs(far).max() / 16000
+
+
+def test_a_step_sees_hairs_of_one_material_as_they_are_or_in_a_mirror(scene):
+    """Their vectors tell that material; in a mirror, hair, motion and body change sides together."""
+    hair, rollout = scene.grooms[0], RolloutMaker(scene).make(5)
+    codes = hair.rest.reshape(len(hair.rest), -1)[:, :CODE]
+    seen = codes + 1.0
+    bank = RolloutBank(scene, lambda strands: codes if np.array_equal(strands.rest, hair.rest) else seen)
+    bank.rollouts, spec = [rollout], scene.spec
+    assert len(np.unique(rollout.materials, axis=0)) > 1
+    for seed in range(8):
+        options = RegressionOptions(clips=1, moments=5, strands=4)
+        plain, other = (
+            {name: values[0].numpy() for name, values in bank.batch(np.random.default_rng(seed), each).items()}
+            for each in (options, replace(options, mirror=1.0))
+        )
+        rows = [next(i for i, rest in enumerate(rollout.rest) if np.array_equal(rest, own)) for own in plain["rest"]]
+        material = plain["frames"][0, spec.slices["material"]]
+        assert (rollout.materials[rows] == material).all()
+        assert (plain["frames"][:, spec.slices["material"]] == material).all()
+        late = [next(t for t, v in enumerate(rollout.vectors) if alike(v, own, spec)) for own in plain["frames"][:-1]]
+        assert (np.diff(late)[::2] == 1).all() and min(late) >= rollout.first - 1
+        np.testing.assert_allclose(plain["moved"], rollout.moved[late][:, rows] * rollout.step, atol=1e-7)
+        np.testing.assert_array_equal(plain["planes"], rollout.planes[late][:, rows])
+        np.testing.assert_array_equal(other["frames"], mirrored_vectors(spec, plain["frames"]))
+        for name in ("rest", "moved"):
+            np.testing.assert_array_equal(other[name], plain[name] * POLAR)
+        np.testing.assert_array_equal(other["planes"], plain["planes"] * [*POLAR, 1])
+        chosen = rollout.strands[rows]
+        np.testing.assert_array_equal(plain["strands"], strand_inputs(hair, codes)[chosen])
+        np.testing.assert_array_equal(other["strands"], strand_inputs(mirrored_strands(hair), seen)[chosen])
+        np.testing.assert_array_equal(plain["length"], hair.length[chosen])
+
+
+def alike(vector, other, spec):
+    """Whether two boundary vectors are those of one moment, whatever the material."""
+    return all(np.array_equal(vector[part], other[part]) for part in (spec.slices["pose"], spec.slices["history"]))
+
+
+def test_later_rollouts_replace_earlier_ones_and_a_resumed_training_has_the_same(scene, tmp_path, monkeypatch):
+    """In memory and on disk: hours of simulations fit into neither. The first ones stay, for the inputs' scale comes from them."""
+    monkeypatch.setattr(regression, "MOST", 5)
+    monkeypatch.setattr(regression, "FIRST", 2)
+    maker, files = RolloutMaker(scene), [tmp_path / f"{number:06d}.npz" for number in range(8)]
+    for number, path in enumerate(files):
+        save(path, maker.make(number))
+
+    def bank():
+        return RolloutBank(scene, lambda strands: np.zeros((len(strands.rest), CODE), np.float32))
+
+    grown, again = bank(), bank()
+    for some in (files[:3], files[:6], files):
+        grown.add(some)
+    again.add(files)
+    assert grown.read == again.read == 8
+    assert [path.stat().st_size > 0 for path in files] == [n in (0, 1, 5, 6, 7) for n in range(8)]
+    for each in (grown, again):
+        assert [rollout.moved.sum() for rollout in each.rollouts] == [
+            maker.make(n).moved.sum() for n in (0, 1, 5, 6, 7)
+        ]
