@@ -18,7 +18,7 @@ from ..shot.curves import rest_points, widest_sample
 from ..shot.made_from import INPUTS, made_from
 from ..shot.recorded import record
 from ..shot.stage import Shot, StageGroom
-from ..skel.binding import FORMER
+from ..skel.binding import FORMER, bound_skeleton
 from .header import apply_binding, over_prim, write_header
 from .sample_layer import SampleLayer
 from .spool import Spool
@@ -53,13 +53,13 @@ class OverrideWriter:
             return  # done by the bake that this one resumes
         over = over_prim(layer, item.prim)
         record(over, {**facts, "joint": item.joint, INPUTS: made_from(item.attachment, item.groom)})
-        if item.attachment.skinned:
+        if skeleton := bound_skeleton(item.prim):  # perhaps of another character than the one that carries it
             # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
             apply_binding(over, item.prim)
             relation = Sdf.RelationshipSpec(over, "skel:skeleton", custom=False)
             relation.targetPathList.ClearEditsAndMakeExplicit()
             former = Sdf.RelationshipSpec(over, FORMER, custom=True)
-            former.targetPathList.explicitItems = [item.attachment.rig.path]
+            former.targetPathList.explicitItems = [skeleton]
         names = Sdf.ValueTypeNames
         Sdf.AttributeSpec(over, "extent", names.Float3Array)
         points = Sdf.AttributeSpec(over, "points", names.Point3fArray)

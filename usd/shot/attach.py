@@ -45,7 +45,6 @@ class Attachment:
             head's role.
         to_bind: the prim's own space to bind world [m], (4, 4).
         how: the carrying joint and how it was found, in words.
-        skinned: whether UsdSkel would deform the prim itself.
         at_default: the same for points that would be authored at the default time, (4, 4), if the shot only has those of a moving
             cache; otherwise None.
         far: distance of the roots from the joint [m], if they are out of its reach and neither a binding nor a skin below says that
@@ -59,7 +58,6 @@ class Attachment:
     character: Character
     to_bind: np.ndarray
     how: str
-    skinned: bool
     at_default: np.ndarray | None = None
     far: float = 0.0
     drawn: bool = False
@@ -184,7 +182,6 @@ def _bound(prim: Usd.Prim, rig: StageRig, placement: Placement, notes: list[str]
         character=carried_by(rig, joint),
         to_bind=to_bind,
         how=f"{why} (its own skel binding)",
-        skinned=True,
         told=bool(spread),
         turned=turned,
     )
@@ -207,7 +204,7 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
         how = f"joint '{rig.source.names[joint]}' (which its own transform follows)"
     notes += [*turned, *spread, *unsure(prim, seat, placement)]
     at_default = ways(rig, mesh, placement)[0] if moved else None
-    return Attachment(rig, carried_by(rig, joint), to_bind, how, False, at_default, told=bool(spread), turned=turned)
+    return Attachment(rig, carried_by(rig, joint), to_bind, how, at_default, told=bool(spread), turned=turned)
 
 
 def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None) -> Attachment:
@@ -241,7 +238,7 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
     at_default = None if when is None else ways(rig, None, placement)[0]
     why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
     how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
-    return Attachment(rig, rig.character, to_bind, how, False, at_default, far)
+    return Attachment(rig, rig.character, to_bind, how, at_default, far)
 
 
 def _nearest(prim: Usd.Prim, able: list[tuple[float, StageRig]]) -> list[tuple[float, StageRig]]:

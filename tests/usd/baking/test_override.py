@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom, Vt
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.baking.bake import bake
 from usd.baking.header import write_header
 from usd.border.stage_files import used_files
 from usd.border.units import Border
 from usd.shot.stage import read_shot
+from usd.skel.binding import bound_skeleton
 
 from ..shots import Recipe, samples, write_shot
 
@@ -133,6 +134,20 @@ def test_the_extent_holds_the_width_of_hair_in_the_unit_of_its_points(tmp_path, 
     baked = bake(path, tmp_path / "a.usdc", still_model, frames="1").path
     points, extent = (values * unit for values in samples(baked, "points", "extent", at=1))
     np.testing.assert_allclose(extent, [points.min(axis=0) - 0.02, points.max(axis=0) + 0.02], atol=1e-5)
+
+
+def test_hair_that_another_character_carries_than_it_is_bound_to_is_not_skinned_by_its_own(tmp_path, still_model):
+    layer = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, Recipe(nesting="/ann"))))
+    Sdf.CopySpec(Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, Recipe(nesting="/bob"), "bob"))), "/bob", layer, "/bob")
+    layer.Save()
+    given = {"grooms": ["/ann/Hair"], "skeleton": "/bob/Rig"}
+    out = bake(layer.realPath, tmp_path / "hair.usdc", still_model, **given).path
+    stage, cache = Usd.Stage.Open(str(out)), UsdSkel.Cache()
+    cache.Populate(UsdSkel.Root(stage.GetPrimAtPath("/ann")), Usd.PrimDefaultPredicate)
+    (binding,) = cache.ComputeSkelBindings(UsdSkel.Root(stage.GetPrimAtPath("/ann")), Usd.PrimDefaultPredicate)
+    assert [str(target.GetPrim().GetPath()) for target in binding.GetSkinningTargets()] == ["/ann/Skin"]
+    (again,) = read_shot(out, **given).grooms
+    assert again.attachment.rig.path == "/bob/Rig" and bound_skeleton(again.prim) == "/ann/Rig"
 
 
 @pytest.mark.parametrize("bound", ["mesh", "none"])

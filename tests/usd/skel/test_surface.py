@@ -13,7 +13,7 @@ from usd.shot.curves import rest_points
 from usd.shot.stage import read_rigs, read_shot
 from usd.skel.binding import bound_skeleton
 
-from ..shots import CENTRE, HEAD, JOINTS, Recipe, samples, write_shot
+from ..shots import CENTRE, HEAD, JOINTS, RIG, Recipe, samples, write_shot
 
 
 def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path, still_model):
@@ -47,7 +47,7 @@ def test_a_binding_above_a_groom_counts_as_usd_skel_counts_it(tmp_path, still_mo
     np.testing.assert_allclose(item.groom.points, expected, atol=1e-6)
     # Unbinding the hair leaves the group's binding, which readers of the bake must handle.
     (again,) = read_shot(bake(path, tmp_path / "hair.usdc", still_model, frames="1:2").path).grooms
-    assert (again.joint, again.attachment.skinned) == (item.joint, True)
+    assert (again.joint, bound_skeleton(again.prim)) == (item.joint, RIG)
     np.testing.assert_array_equal(again.groom.points, item.groom.points)
     hair.GetPrim().GetRelationship("skel:skeleton").SetTargets([])
     stage.Save()
@@ -77,7 +77,7 @@ def test_a_bake_that_is_flattened_or_referenced_still_tells_the_binding_of_its_h
         Usd.Stage.Open(str(made)).Export(str(copy))
         copy = bake(copy, tmp_path / "again.usdc", still_model, frames="1:3").path if way == "rebaked" else copy
     (item,) = read_baked(copy).shot.grooms
-    assert (item.joint, item.attachment.skinned) == (before.joint, True)
+    assert (item.joint, bound_skeleton(item.prim)) == (before.joint, item.attachment.rig.path)
     np.testing.assert_allclose(item.groom.points, before.groom.points, atol=1e-6)
 
 
