@@ -174,8 +174,8 @@ def _value(name: str, word: str, default):
                 raise ValueError
             return number
     except (KeyError, ValueError):
-        wanted = (
-            "|".join(m.name.lower() for m in type(default)) if isinstance(default, enum.Enum) else f"like {default}"
-        )
+        wanted = "a whole number" if default is None else f"like {default}"
+        if isinstance(default, enum.Enum):
+            wanted = "|".join(m.name.lower() for m in type(default))
         raise NeuralocksError(f"--set {name}={word}: is not a value for it; give {wanted}") from None
     return word

@@ -51,6 +51,7 @@ def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_p
         (("--set", "clips=10000000"), "clips=10000000: must be at most 10,000"),
         ((*selfsupervised, "--set", "poses=100000000"), "poses=100000000: must be at most 10,000"),
         (("--set", "mirror=5"), "mirror=5"),
+        (("--set", "steps=ten"), "--set steps=ten: is not a value for it; give a whole number"),
         ((*selfsupervised, "--set", "warmup=1.5"), "warmup=1.5"),
         (("--set", "motion=magic"), "modulated"),
         (("--set", "seed=-1"), "--seed"),
