@@ -29,8 +29,8 @@ def tressfx_text(points=POINTS, counts=COUNTS):
 
 
 def tressfx_v3():
-    header = struct.pack("<fII", 3.0, 2, 4).ljust(144, b"\0") + struct.pack("<I", 296)
-    return header.ljust(296, b"\0") + POINTS.tobytes()
+    header = struct.pack("<fII", 3.0, 2, 4).ljust(144, b"\0") + struct.pack("<I", 304)  # not right after the header
+    return header.ljust(304, b"\0") + POINTS.tobytes()
 
 
 def tressfx_v4():
