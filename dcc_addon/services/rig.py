@@ -59,10 +59,13 @@ class RigArrays:
         return re.sub(r"\w+", lambda word: self._renamed.get(word[0], word[0]), text)
 
     def patterns(self, text: str) -> list[str]:
-        """Patterns of joints from an artist's patterns of bones, separated by commas; a joint's name counts, too."""
+        """Patterns of joints from an artist's patterns of bones, separated by commas; a joint's name counts, too. A bone's own name is no
+        pattern, such as `hair[L]`.
+        """
         found = []
         for word in filter(None, map(str.strip, text.split(","))):
-            hits = [path for path, bone in zip(self.paths, self.bones, strict=True) if fnmatchcase(bone, word)]
+            named = zip(self.paths, self.bones, strict=True)
+            hits = [path for path, bone in named if bone == word or word not in self.bones and fnmatchcase(bone, word)]
             found += hits or [word]
         return found
 

@@ -166,6 +166,8 @@ def test_hair_bones_have_the_names_that_blender_shows():
         bones.chains_of(arrays, character, "hair.09, spine.1")
     with pytest.raises(NeuralocksError, match="'Pony Tail'"):
         bones.chains_of(arrays, character, "Pony Tail")
+    bracketed = rig.RigArrays("Rig", ("spine", "head", "hair[LR]", "hair[LR].1", "hairL"), parents, places)
+    assert bracketed.patterns("hair[LR], hair[A-Z]") == ["spine/head/hair_LR_", "spine/head/hairL"]
 
 
 def test_card_fits_a_sidebar():
