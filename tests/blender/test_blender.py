@@ -90,7 +90,11 @@ def running():
 
 
 @pytest.mark.parametrize("version", blenders.asked_for())
-@pytest.mark.parametrize("scenario", scenarios.modules())
+@pytest.mark.parametrize(
+    "scenario",
+    # What is stopped by its own limit says which scenario that was, and leaves a Blender for the next.
+    [pytest.param(name, marks=pytest.mark.timeout(SLOW.get(name, LIMIT) + 60)) for name in scenarios.modules()],
+)
 def test_scenario(version, scenario, running, random_model, tmp_path, tmp_path_factory):
     """Runs one scenario; its output is shown when it fails."""
     if scenario in SLOW and not os.environ.get("NEURALOCKS_SLOW"):
