@@ -50,6 +50,14 @@ def test_a_loop_that_walks_on_ends_with_its_last_sample():
     assert np.array_equal(clip.at([clip.end])[0], clip.joints[-1])
 
 
+def test_a_loop_tells_how_far_its_ends_are_turned_apart_but_not_of_joints_that_are_hidden_at_one():
+    ends = np.tile(np.diag([2.0, -1.0, 3.0, 1.0]), (2, 4, 1, 1))
+    ends[1, 1:, :3, :3] = rotation.from_vector([0.0, 0.5, 0.0]) @ ends[1, 1:, :3, :3]
+    ends[0, 2, :3, :3] = 0
+    ends[1, 3, :3, :3] = 0
+    np.testing.assert_allclose(motion.loop_turns(ends), [0, np.degrees(0.5), 0, 0], atol=1e-5)
+
+
 def test_a_joint_that_grows_is_half_grown_halfway():
     clip = moved([0.0, 1.0], head_turn=lambda t: rotation.from_vector(np.outer(t, [0, 1.0, 0])))
     grown = clip.joints.copy()
