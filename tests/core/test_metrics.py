@@ -173,11 +173,11 @@ def test_echo_of_a_decaying_swing():
 
 
 def test_lengths_of_ragged_strands_and_stretch():
-    points = np.array([[0, 0, 0], [1, 0, 0], [1, 2, 0], [5, 5, 5], [0, 0, 0], [0, 0, 3.0]])
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 2, 0], [5, 5, 5], [0, 0, 0], [0, 0, 6.0]])
     counts = np.array([3, 1, 2])
     lengths = metrics.strand_lengths(points, counts)
-    np.testing.assert_allclose(lengths, [3, 0, 3])
-    result = metrics.stretch(np.array([[3.3, 0, 3.0]]), lengths)
+    np.testing.assert_allclose(lengths, [3, 0, 6])
+    result = metrics.stretch(np.array([[3.3, 0, 6.0]]), lengths)
     assert result["stretch_cm"] == pytest.approx(15)
     assert result["stretch_percent"] == pytest.approx(5)
     assert result["stretch_percent_max"] == pytest.approx(10)
@@ -191,6 +191,8 @@ def test_penetration_counts_only_what_is_deeper_than_at_rest():
     assert result["penetration_3mm_percent"] == pytest.approx(40)
     assert result["penetration_worst_mm"] == pytest.approx(5)
     assert result["inside_at_rest_percent"] == pytest.approx(40)
+    rounded = metrics.penetration(np.array([[-1e-6, -0.002001]]), np.array([0.0, -0.002]))
+    assert rounded["penetration_percent"] == 0 < rounded["penetration_worst_mm"]
 
 
 def test_what_is_unknown_is_not_fine():

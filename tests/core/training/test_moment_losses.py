@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The losses of known motion: what the paper's training is told of the frames before, of materials and of the body."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs torch")
+
+from neuralocks_core import rotation
+from neuralocks_core.materials import Material
+from neuralocks_core.network_sizes import STRAND, K
+from neuralocks_core.training.moment_losses import moment_losses
+from neuralocks_core.training.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.moments import MomentPool
+from neuralocks_core.training.rollouts import TrainingScene
+from tests.core.rigs import person, straight_hair
+
+OPTIONS = SelfSupervisedOptions(output="displacement", supported=False, random_materials=False, volume=0.0)
+AT = torch.tensor([4.0, 1.5, 1.0])[:, None, None] * 0.02 * torch.randn(K, 3, generator=torch.Generator().manual_seed(0))
+AT[:, :2] = 0
+"""Displacements (3, 24, 3) [m] of all strands two steps ago, one step ago and now."""
+
+
+class Known:
+    """A network that gives AT; it keeps what it is told of the frames."""
+
+    def strand_part(self, strands):
+        return torch.zeros(*strands.shape[:2], 1)
+
+    def frame_part(self, frames):
+        self.frames = frames
+        return torch.cat([AT, AT[:1]]).flatten(-2).expand(len(frames), 4, 3 * K)
+
+    def tail(self, strands, frame):
+        return frame + strands
+
+
+@pytest.fixture(scope="module")
+def pool():
+    pool = MomentPool(TrainingScene(person(), (straight_hair(),), frames=40, strands=16), supported=False, volume=False)
+    pool.grow()
+    return pool
+
+
+def losses(pool, options, hair=None, moment=None, seed=0, dynamics=1.0, net=None):
+    moment = moment or pool.moments[0]
+    hair = hair or pool.hair[moment.hair]
+    inputs, rng = [np.zeros((200, STRAND), np.float32)] * 8, np.random.default_rng(seed)
+    found = moment_losses(net or Known(), [moment], [hair], inputs, pool.scene.spec, options, rng, dynamics)
+    return {name: value.item() for name, value in found.items()}
+
+
+def test_inertia_and_damping_are_those_of_the_frames_before(pool):
+    """As seen from the head as it is now, and for damping from the head as it was."""
+    back = np.tile(np.eye(4), (2, 1, 1))
+    back[:, :3, :3] = rotation.from_vector([[0.1, 0.2, -0.1], [0.3, -0.2, 0.1]])
+    back[:, :3, 3] = [[0.01, 0.0, -0.02], [0.03, 0.02, 0.0]]
+    moment = replace(pool.moments[0], back=back)
+    rods, dt = pool.hair[moment.hair].rods, pool.scene.spec.dt
+    before2, before, now = (rods.rest + moved for moved in AT)
+    one, two = (p @ b[:3, :3].T + b[:3, 3] for p, b in zip((before, before2), torch.from_numpy(back).float()))
+    per_mass = rods.mass / rods.length.sum(-1, keepdim=True)
+    inertia = ((now - 2 * one + two).square().sum(-1) * per_mass).sum(-1).mean().item() / (2 * dt**2)
+    damping = ((AT[2] - AT[1]).square().sum(-1) * per_mass).sum(-1).mean().item() / (2 * dt)
+    found = losses(pool, replace(OPTIONS, damping=7.0, undetached=3.0), moment=moment, dynamics=0.5)
+    expected = {"inertia": 0.5 * inertia, "inertia_past": 1.5 * inertia, "damping": 3.5 * damping}
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-4)
+    drawn, net = Material.random(np.random.default_rng(3)), Known()
+    assert drawn.damping != Material().damping
+    found = losses(pool, replace(OPTIONS, random_materials=True), moment=moment, seed=3, net=net)
+    assert found["damping"] == pytest.approx(drawn.damping * damping, rel=1e-4)
+    told = replace(drawn, weight=1.0).log_ratios()
+    assert (net.frames[..., pool.scene.spec.slices["material"]].numpy() == told).all()
+
+
+def test_each_groom_has_its_style_and_the_last_holds_for_further_ones(pool):
+    hair, moment = pool.hair[0], pool.moments[0]
+    surface, normals = _ball(0.06)
+    moment, options = (
+        replace(moment, surface=surface, normals=normals),
+        replace(OPTIONS, style=(100.0, 300.0), static=True),
+    )
+    styled = [losses(pool, options, replace(hair, groom=i), moment)["hair_style"] for i in (0, 1, 5)]
+    assert styled[0] > 1e-3 and styled[1:] == pytest.approx([3 * styled[0]] * 2)
+
+
+def test_hair_is_kept_as_far_from_the_body_as_it_may_be(pool):
+    """By its own margin, which is less where it rests nearer."""
+    surface, normals = _ball(0.06)
+    moment, options = replace(pool.moments[0], surface=surface, normals=normals), replace(OPTIONS, static=True)
+    hair = pool.hair[moment.hair]
+    pushed = [
+        losses(pool, options, replace(hair, margin=torch.full_like(hair.margin, margin)), moment)["body_collision"]
+        for margin in (-0.1, 0.01, 0.02)
+    ]
+    assert pushed[0] == 0 < pushed[1] < 0.5 * pushed[2]
+
+
+def _ball(radius):
+    """Vertices of a ball around the head joint in a tree, and their normals."""
+    from neuralocks_core.body.tree_search import surface_tree
+
+    way = np.random.default_rng(0).normal(size=(2000, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    return surface_tree(radius * way), way
