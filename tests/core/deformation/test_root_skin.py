@@ -9,6 +9,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.deformation.root_skin import FAR, NEAR, RootSkin
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
+from neuralocks_core.rotation import from_vector
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.strands.strand_set import strands_on
 from tests.core import rigs
@@ -19,8 +20,10 @@ SHEAR = np.array([[0.1, 0.2, 0.0], [0.0, 0.3, 0.1], [-0.2, 0.0, 0.1]])
 
 @pytest.fixture
 def character():
-    """A head: its first blend shape moves the skin by a linear map, the second nothing, and the third a foot far below."""
-    person, count = rigs.person(), len(BALL.vertices)
+    """A head that does not face +Z: its first blend shape moves the skin by a linear map, the second nothing, and the third a foot far
+    below.
+    """
+    person, count = rigs.person(from_vector(np.array([0, 1.7, 0]))), len(BALL.vertices)
     centre, foot = person.skeleton.bind[person.head, :3, 3], np.array([0, -1.5, 0])
     none, joints = np.zeros_like(BALL.vertices), np.repeat([[person.head], [0]], count, axis=0)
     shapes = {
