@@ -179,6 +179,30 @@ def test_a_large_head_or_hairdo_is_in_the_picture_from_all_sides(size, stretch):
             assert (np.abs(up) < highest).all() and (np.abs(right) < highest * size[0] / size[1]).all()
 
 
+def test_the_view_goes_round_to_the_characters_left():
+    with closing(Film(scene(1), 62, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
+        for azimuth, seen_from in ((0, [0, 0, 1]), (90, [1, 0, 0]), (180, [0, 0, -1])):
+            assert film._camera(0, azimuth).to_eye @ seen_from > 0.99
+
+
+def test_copies_beside_strands_turn_with_the_head():
+    with closing(Film(scene(), 62, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
+        assert film._copies > 1
+        first, last = (film.light(frame, 0)[2] for frame in (0, 3))
+        head = film.scene.head[3]
+        np.testing.assert_allclose(last, first @ head[:3, :3].T + head[:3, 3], atol=1e-9)
+
+
+def test_a_gif_lasts_as_long_as_its_frames(tmp_path):
+    """Its unit is a hundredth of a second, in which most rates are no whole number."""
+    from PIL import Image, ImageSequence
+
+    path = preview.render(scene(13), tmp_path / "hair.gif", size=(32, 40), detail=Detail(20, 4, 1, 1))
+    with Image.open(path) as image:
+        shown = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
+    assert sum(shown) == pytest.approx(1000 * 13 / 24, abs=5) and min(shown) >= 40
+
+
 def test_no_camera_flies_across_a_cut():
     """For a third of a second on both sides of it, nobody was in the picture, and after it, only a back."""
     person, half = scene(48), 24

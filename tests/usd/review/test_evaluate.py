@@ -40,6 +40,21 @@ def test_a_rigid_bake_has_no_motion_no_droop_and_exact_lengths(rigid):
     assert values["stretch_percent_max"] < 0.01
 
 
+def test_droop_is_how_far_tips_hang_below_the_rigid_hair_whichever_way_the_head_is_up(tmp_path, still_model):
+    lying = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+    recipe, out = Recipe(place=lying, strands=6), tmp_path / "hair.usda"
+    bake(write_shot(tmp_path, recipe), out, still_model, frames="1:3", velocities=False, resolve=False)
+    stage, layer = Usd.Stage.Open(str(out)), Sdf.Layer.FindOrOpen(str(out))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
+    below = np.tile(np.linspace(0, 0.02, recipe.vertices), recipe.strands)[:, None] * [0, -1.0, 0]
+    for code in curves.GetPointsAttr().GetTimeSamples():
+        to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(curves.GetPrim()))
+        moved = np.array(curves.GetPointsAttr().Get(code)) + below @ to_world[:3, :3].T
+        layer.SetTimeSample(curves.GetPointsAttr().GetPath(), code, Vt.Vec3fArray.FromNumpy(moved.astype(np.float32)))
+    layer.Save()
+    assert evaluate(out).grooms["/Hero/Hair"]["droop_cm"] == pytest.approx(2, abs=0.01)
+
+
 def test_a_moving_bake_moves_and_keeps_its_lengths(tmp_path, model):
     bake(shipped_shot(), tmp_path / "moving.usdc", model, frames=FRAMES, velocities=False)
     values = next(iter(evaluate(tmp_path / "moving.usdc").grooms.values()))
