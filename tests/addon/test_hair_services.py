@@ -9,12 +9,15 @@ import pytest
 import trimesh
 
 from dcc_addon.services import bones, widths
+from dcc_addon.services.history import SampledBoundary
 from dcc_addon.services.live import LiveHair
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.skinned_body import Body
+from neuralocks_core.wind import Wind
 from tests.core.rig.builders import character
 
 
@@ -55,14 +58,17 @@ def test_live_hair_leaves_an_arm_that_the_network_does_not_read():
         assert (np.abs(within - beside).max() > 0.01) == resolve
 
 
-def test_live_hair_rides_on_skin_that_blend_shapes_move():
-    """As in a bake; the clip that is followed tells which shapes the shot begins with."""
-    who, ball = character(), trimesh.creation.icosphere(3, 0.1)
+@pytest.mark.parametrize("near", [9.0, 0.04])
+def test_live_hair_rides_on_skin_that_blend_shapes_move(near):
+    """As in a bake; the clip that is followed tells which shapes the shot begins with. A small patch of skin, which does not make the
+    body another one to the network, takes its hair along, too.
+    """
+    who, ball = character(), trimesh.creation.icosphere(4, 0.1)
     joints, way = np.full((len(ball.vertices), 1), who.head), np.array([0.0, 0.03, 0.01])
-    shapes = {"up": np.tile(way, (len(ball.vertices), 1))}
+    ahead = np.array([0.06, 0.05, 0.062])
+    shapes = {"up": way * (np.linalg.norm(ball.vertices - ahead, axis=1) < near)[:, None]}
     who = replace(who, body=Body(ball.vertices + [0, 1.68, 0], ball.faces, joints, np.ones(joints.shape), shapes))
-    root = np.array([0.1, 1.68, 0])
-    points = (root + np.outer(np.linspace(0, 1, 24), [0.05, -0.25, 0])).astype(np.float32)
+    points = (np.array([0, 1.68, 0]) + ahead + np.outer(np.linspace(0, 1, 24), [0.05, 0.25, 0.1])).astype(np.float32)
     poses = np.tile(who.skeleton.bind, (2, 1, 1, 1))
     live = LiveHair(Groom("hair", points, np.array([24]), None), who, StrandModel.load())
     for resolve in (False, True):
@@ -91,3 +97,53 @@ def test_live_hair_that_follows_another_clip_is_as_if_it_had_followed_no_other()
             found = live.points(0.5, poses[0], np.eye(4)).copy()
         shown.append(found)
     np.testing.assert_array_equal(*shown)
+
+
+def test_a_frame_that_fails_is_not_taken_for_the_one_before(monkeypatch):
+    """The same points are given again while nothing changes; not those that were written half."""
+    who = character()
+    points = np.array([0.1, 1.68, 0]) + np.outer(np.linspace(0, 1, 24), [0.05, -0.25, 0])
+    live = LiveHair(Groom("hair", points.astype(np.float32), np.array([24]), None), who, StrandModel.load())
+    poses = np.tile(who.skeleton.bind, (2, 1, 1, 1))
+    poses[1, :, 0, 3] += 0.1
+    live.follow(Clip([0.0, 1.0], poses))
+    first = live.points(0.0, poses[0], np.eye(4)).copy()
+
+    def carry(_displacement, out, *_):
+        out[:12] = 0
+        raise NeuralocksError("stop")
+
+    with monkeypatch.context() as patched, pytest.raises(NeuralocksError, match="stop"):
+        patched.setattr(live._carrier, "carry", carry)
+        live.points(1.0, poses[1], np.eye(4))
+    np.testing.assert_array_equal(live.points(0.0, poses[0], np.eye(4)), first)
+
+
+def test_what_the_network_reads_is_that_of_the_pose_and_the_look():
+    """In blocks or one by one: at samples and between, of another pose than the sampled one, with other sliders, in a wind."""
+    who, rng = character(), np.random.default_rng(0)
+    poses = np.tile(who.skeleton.bind, (20, 1, 1, 1))
+    poses[:, who.head, :3, :3] = from_vector(np.cumsum(rng.normal(0, 0.1, (20, 3)), axis=0))
+    sampler = StrandModel.load().sampler(who, Clip(np.arange(20) / 24, poses))
+    kept, calm = SampledBoundary(sampler), (0.0,) * 4
+    for time, pose in ((9 / 24, 9), (9 / 24, 3), (9.5 / 24, 9), (10 / 24, 10), (19 / 24, 19), (2.0, 19)):
+        for look in (
+            (calm, 1.0, None),
+            (calm, 0.5, None),
+            ((0.3, 0.0, 0.2, 0.0), 1.0, None),
+            (calm, 1.0, Wind((1.0, 0, 2.0), 0.5)),
+        ):
+            *own, wind = look
+            wanted = sampler.vectors([time], *own, poses[[pose]], wind)[0]
+            np.testing.assert_array_equal(kept.vector(time, np.array(own[0]), own[1], poses[pose], wind), wanted)
+
+
+def test_hair_on_a_head_without_skin_is_not_beside_its_character():
+    """A body may end at the neck."""
+    who, ball = character(), trimesh.creation.icosphere(2, 0.1)
+    joints = np.zeros((len(ball.vertices), 1), int)
+    who = replace(who, body=Body(ball.vertices + [0, 1.0, 0], ball.faces, joints, np.ones(joints.shape)))
+    strand = np.array([0.1, 1.68, 0]) + np.outer(np.linspace(0, 1, 24), [0.05, -0.25, 0])
+    for aside, told in ((0.0, False), (1.0, True)):
+        hair = Groom("hair", (strand + [aside, 0, 0]).astype(np.float32), np.array([24]), None)
+        assert (LiveHair(hair, who, StrandModel.load()).off_skin > 0.3) == told

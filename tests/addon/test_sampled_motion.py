@@ -213,6 +213,18 @@ def test_a_motion_in_parts_is_the_whole():
     assert joined.places == places
 
 
+def test_a_sample_is_found_by_the_frame_that_blender_shows():
+    """Blender's fractions of frames have single precision; between the samples there is none."""
+    bind, world = _motion(np.random.default_rng(4))
+    frames = frame_numbers(-1, 2, 3)[:9]
+    motion = Motion.from_world(frames, 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
+    for row, frame in enumerate(frames):
+        whole = int(np.floor(frame))
+        for near in (whole + float(np.float32(frame - whole)), frame - 1e-7, frame + 1e-7):
+            assert motion.row(near) == row
+    assert [motion.row(frame) for frame in (-1.2, -0.5, 1.5, 2.0)] == [None] * 4
+
+
 def test_frame_numbers():
     np.testing.assert_allclose(frame_numbers(1, 3, 2), [1, 1.5, 2, 2.5, 3])
     assert list(frame_numbers(4, 4, 3)) == [4]

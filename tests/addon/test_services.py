@@ -74,7 +74,9 @@ def test_parents_come_first():
 
 
 def test_weights_keep_the_strongest_four():
-    rows = [(0, g, w) for g, w in enumerate((0.1, 0.4, 0.05, 0.3, 0.2))] + [(1, 5, 1.0)]
+    rows = [(0, g, w / 2) for g, w in enumerate((0.1, 0.4, 0.05, 0.3, 0.2))] + [
+        (1, 5, 1.0)
+    ]  # Blender takes sums as one
     body = rig.BodyArrays("b", np.zeros((3, 3)), np.zeros((0, 3), int), (*BONES[:5], "not a bone"), np.array(rows))
     indices, weights = rig.joint_weights(body, BONES)
     assert list(indices[0]) == [1, 3, 4, 0]
