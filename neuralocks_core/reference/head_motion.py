@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motion between frames: the head's, which is rigid and smooth, and linear for all else."""
+"""Motion between frames: the head's, which is rigid and smooth, and linear for all else, the body's as seen from the head."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.number_arrays import number_array
+from neuralocks_core.reference.arguments import check_pose
 from neuralocks_core.whole_numbers import is_whole
 
 
@@ -53,6 +54,37 @@ def head_motion(head: np.ndarray, substeps: int) -> HeadMotion:
     return HeadMotion(RotationSpline(knots, turns)(at).as_quat(), PchipInterpolator(knots, origin)(at))
 
 
+class SeenFromHead:
+    """A body in the head's frame, where the skin of the head stays between frames. In the world, linear motion would lag behind a
+    head that turns, or moves along a curve.
+
+    Args:
+        body: world points (V, 3) [m] of each frame; each is read once, in order.
+        first: those of the first frame.
+        way: of the head at all substeps.
+        substeps: of a frame.
+    """
+
+    def __init__(self, body: Sequence[np.ndarray] | np.ndarray, first: np.ndarray, way: HeadMotion, substeps: int):
+        self._body, self._vertices = body, len(first)
+        self._turn, self._origin = Rotation.from_quat(way.turn[::substeps]).as_matrix(), way.origin[::substeps]
+        self._seen = {0: self._from_head(first, 0)}
+
+    def __getitem__(self, frame: int) -> np.ndarray:
+        """Points (V, 3) float64 [m] of a frame, canonical.
+
+        Raises:
+            NeuralocksError: see `check_pose`.
+        """
+        if frame not in self._seen:
+            points = self._from_head(check_pose("body", self._body[frame], self._vertices), frame)
+            self._seen = {k: seen for k, seen in self._seen.items() if k == frame - 1} | {frame: points}
+        return self._seen[frame]
+
+    def _from_head(self, points: np.ndarray, frame: int) -> np.ndarray:
+        return (points - self._origin[frame]) @ self._turn[frame]
+
+
 def frames_without(head: np.ndarray, ahead: int) -> int:
     """How many of the head's frames are simulated, if the last ones, `ahead`, only shape its motion before.
 
@@ -66,8 +98,8 @@ def frames_without(head: np.ndarray, ahead: int) -> int:
     return len(head) - ahead
 
 
-def between(values: Sequence[np.ndarray] | np.ndarray, step: int, substeps: int) -> np.ndarray:
-    """Body points or wind at a substep: of T `values`, each one frame's, those of the frames before and after it, linear."""
+def between(values: Sequence[np.ndarray] | np.ndarray | SeenFromHead, step: int, substeps: int) -> np.ndarray:
+    """What of T `values`, each one frame's, lies between those of the frames before and after a substep: linear."""
     frame, part = divmod(step, substeps)
     if part == 0:
         return np.asarray(values[frame])

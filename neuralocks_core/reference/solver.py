@@ -21,7 +21,7 @@ from neuralocks_core.reference.arguments import (
     check_start,
     check_wind,
 )
-from neuralocks_core.reference.head_motion import HeadMotion, between, frames_without, head_motion
+from neuralocks_core.reference.head_motion import HeadMotion, SeenFromHead, between, frames_without, head_motion
 from neuralocks_core.reference.rest import RestRods, rest_rods
 
 INTEGRATOR = "BDF2"
@@ -85,8 +85,8 @@ def simulate(
     Args:
         rest: (S, K, 3) canonical rest points [m]; vertices 0 and 1 are clamped to the head.
         head: (T, 4, 4) canonical -> world, rigid, one per frame.
-        body: (T, V, 3) world points [m] of the body, or None for no contact; without substeps each frame is read
-            once, in order.
+        body: (T, V, 3) world points [m] of the body, or None for no contact; each frame is read once, in order.
+            Over substeps, it moves linearly as seen from the head.
         triangles: (F, 3) of the body, outward (counter-clockwise), closed where hair may touch it.
         material: object or mapping with bend, weight, damping, clumping, each a number or (S,); None: `Material()`.
         dt: time between frames [s].
@@ -118,8 +118,7 @@ def simulate(
     check_amounts(volume=volume, collision=collision, tolerance=tolerance)
     way, frames = head_motion(head, substeps), frames_without(head, ahead)
     # relative to the head's first position: far from the world's origin, rounding would dominate
-    away = way.origin[0]
-    way = replace(way, origin=way.origin - away)
+    near = replace(way, origin=way.origin - way.origin[0])
     material, wind = check_material(material, strands), check_wind(wind, frames)
     result = _empty_rollout(frames, strands, vertices, planes)
     if strands == 0:
@@ -140,20 +139,18 @@ def simulate(
     )
     if body is not None:
         first, faces = check_body(body, triangles, frames)
-        first = first - away
-        if bind_body is None:
-            bind_body = first @ np.asarray(head[0], np.float64)[:3, :3]
-        stepper.attach_body(check_pose("bind_body", bind_body, len(first)), faces)
-        stepper.move_body(first)
+        seen = SeenFromHead(body, first, way, substeps)
+        stepper.attach_body(check_pose("bind_body", seen[0] if bind_body is None else bind_body, len(first)), faces)
+        stepper.move_body(seen[0])
     stepper.blow(wind[0])
-    _begin(stepper, way, rods, start, iterations, volume > 0)
+    _begin(stepper, near, rods, start, iterations, volume > 0)
     for frame in range(frames):
         steps = [] if frame == 0 else range((frame - 1) * substeps + 1, frame * substeps + 1)
         for step in steps:
             if body is not None:
-                stepper.move_body(between(body, step, substeps) - away - way.origin[step])
+                stepper.move_body(between(seen, step, substeps))
             stepper.blow(between(wind, step, substeps))
-            stepper.step(way.turn[step], way.origin[step], dt / substeps, iterations)
+            stepper.step(near.turn[step], near.origin[step], dt / substeps, iterations)
         left = stepper.read(result.points[frame], result.planes[frame] if planes else None)
         result.residual[frame], result.iterations[frame] = left
         if progress:

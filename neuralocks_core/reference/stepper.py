@@ -7,7 +7,6 @@ import numpy as np
 
 from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.motion import G
-from neuralocks_core.reference.arguments import check_pose
 from neuralocks_core.reference.rest import RestRods
 from neuralocks_core.warp_device import start_warp
 
@@ -125,12 +124,13 @@ class Stepper:
         self._run(self.kernels.rest_margin, (self.rest, self.load.plane, self.widest, self.load.margin))
 
     def move_body(self, points: np.ndarray) -> None:
-        """Set the body's points (V, 3) [m], in world axes from the head's position on: far from the origin, single precision would
-        not find the nearest of them.
+        """Set the body's points (V, 3) [m] in the head's frame: in the world, single precision would not find the nearest of them far
+        from the origin.
         """
-        points = np.ascontiguousarray(check_pose("body", points, self.body.shape[0]), np.float32)
-        self._body_now = points
-        staged = self.wp.array(points, dtype=self.wp.vec3, device="cpu", copy=False)
+        # No vertex's distance to the body can have shrunk by more than this sum.
+        self.drift += float(np.sqrt(np.square(points - self._body_in_head).sum(1).max()))
+        self._body_in_head = points
+        staged = self.wp.array(np.ascontiguousarray(points, np.float32), dtype=self.wp.vec3, device="cpu", copy=False)
         self.wp.copy(self.body, staged)
         self.mesh.refit()
 
@@ -142,7 +142,6 @@ class Stepper:
         """Set the first pose, the head's rotation (4,) xyzw and position (3,) [m], and (S, K, 3) canonical points [m]."""
         self._pose(turn, origin)
         self.x.assign(np.ascontiguousarray(np.swapaxes(points @ self._matrix().T + origin, 0, 1)))
-        self._add_drift()
         self.carry = self.carry_before = self.wp.quatd(0.0, 0.0, 0.0, 1.0), self.wp.vec3d(0.0, 0.0, 0.0)
 
     def settle(self, dts: Sequence[float], iterations: int) -> None:
@@ -167,7 +166,7 @@ class Stepper:
 
     def step(self, turn: np.ndarray, origin: np.ndarray, dt: float, iterations: int) -> None:
         """Advance by `dt` [s] to a new pose of the head, rotation (4,) xyzw and position (3,) [m], in at most `iterations`
-        Newton steps; the body has already been moved to its place beside that pose.
+        Newton steps; the body has already been moved.
         """
         wp = self.wp
         older, self._pose_before = self._pose_before, (self.turn, self.origin)
@@ -179,7 +178,6 @@ class Stepper:
             self.last, self.x = self.x, self.last
             self._moving = True
         if self.mesh is not None:
-            self._add_drift()
             # not at the predicted state, which may be past the body's far side
             self._run(self.kernels.carry_along, (*self.carry, self.last, self.x))
             self._look(self.x, 1)
@@ -241,13 +239,6 @@ class Stepper:
             self.corner, self.load.plane, self.wake,
         )  # fmt: skip
         self._run(self.kernels.body_planes, args)
-
-    def _add_drift(self) -> None:
-        """Add up how far the body moved in the head's frame: no vertex's distance to it can have shrunk by more."""
-        if self.mesh is not None:
-            now = self._body_now @ self._matrix()
-            self.drift += float(np.sqrt(np.square(now - self._body_in_head).sum(1).max()))
-            self._body_in_head = now
 
     def _carry(self, turn: object, origin: object) -> tuple:
         """Rotation and origin of the motion that takes a point fixed to the head from a pose to the present one."""

@@ -139,8 +139,7 @@ def body_planes(
     plane: wp.array2d(dtype=wp.vec4d),
     wake: wp.array(dtype=wp.int32),
 ):
-    """Nearest body element as a plane through its closest point; distances inside are negative. The mesh is in world axes, from the
-    head's position on.
+    """Nearest body element as a plane through its closest point; distances inside are negative. The mesh is in the head's frame.
 
     drift: the farthest that any point of the body has moved in the head's frame since the beginning, summed over steps. A vertex
     that cannot have come near the body since it was `seen` (head's frame, drift already added to `clear`) has no plane;
@@ -150,8 +149,7 @@ def body_planes(
     k, s = wp.tid()
     if k < 2:
         return
-    p = x[k, s] - origin
-    home = wp.quat_rotate_inv(turn, p)
+    home = wp.quat_rotate_inv(turn, x[k, s] - origin)
     shift = wp.length(home - seen[k, s])
     far = FAR
     if moved == 1:
@@ -161,7 +159,7 @@ def body_planes(
         return
     if moved == 0 and shift < STILL:
         return
-    q = wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2]))
+    q = wp.vec3(wp.float32(home[0]), wp.float32(home[1]), wp.float32(home[2]))
     bound = reach
     last = face[k, s]
     if last >= 0:
@@ -182,9 +180,9 @@ def body_planes(
         n = wp.mesh_eval_face_normal(mesh, hit.face)
         if gap > 1.0e-4:
             n = away / gap
-        normal = wp.vec3d(wp.float64(n[0]), wp.float64(n[1]), wp.float64(n[2]))
-        at = wp.vec3d(wp.float64(near[0]), wp.float64(near[1]), wp.float64(near[2]))
-        found = wp.vec4d(normal[0], normal[1], normal[2], wp.dot(normal, at + origin))
+        normal = wp.quat_rotate(turn, wp.vec3d(wp.float64(n[0]), wp.float64(n[1]), wp.float64(n[2])))
+        at = wp.quat_rotate(turn, wp.vec3d(wp.float64(near[0]), wp.float64(near[1]), wp.float64(near[2]))) + origin
+        found = wp.vec4d(normal[0], normal[1], normal[2], wp.dot(normal, at))
     wake[s] = 1
     face[k, s] = element
     seen[k, s] = home

@@ -5,10 +5,12 @@ import re
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip("warp", reason="the reference needs warp")
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.reference import simulate, simulate_xpbd
+from neuralocks_core.reference.head_motion import head_motion
 from tests.core.reference.swinging_heads import carried, edge_lengths, groom, heads, shaken, sphere
 
 
@@ -166,6 +168,26 @@ def test_substeps_follow_the_same_motion():
     rest, head = groom(4, curl=0), shaken(30)
     once, twice, more = (simulate(rest, head, substeps=n, tolerance=1e-5).points for n in (1, 4, 8))
     assert np.abs(twice - more).mean() < 0.5 * np.abs(once - more).mean()
+
+
+def test_the_skin_of_the_head_moves_with_it_between_frames():
+    """A head that nods about the neck and is thrown about: substeps find the skin where a body that is given at each of them has it."""
+    rest, head = groom(12, curl=0), shaken(12, 1.2)
+    head[:, :3, 3] = 3 * head[:, :3, 3] + head[:, :3, :3] @ [0.0, 0.15, 0.0]
+    points, faces = sphere()
+    way = head_motion(head, 2)
+    finer = np.tile(np.eye(4), (len(way.turn), 1, 1))
+    finer[:, :3, :3], finer[:, :3, 3] = Rotation.from_quat(way.turn).as_matrix(), way.origin
+    free, held, exact = (
+        simulate(rest, motion, body, faces, bind_body=points, dt=step / 60, substeps=step).points[:: 3 - step]
+        for motion, body, step in (
+            (head, None, 2),
+            (head, carried(head, points).astype(float), 2),
+            (finer, np.einsum("tij,vj->tvi", finer[:, :3, :3], points) + finer[:, None, :3, 3], 1),
+        )
+    )
+    assert np.abs(held - free).max() > 0.02
+    assert np.abs(held - exact).max() < 1e-5
 
 
 def longer(rest):
