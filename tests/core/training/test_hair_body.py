@@ -7,7 +7,7 @@ import trimesh
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.skinned_body import Body
-from neuralocks_core.training.hair_body import hair_body
+from neuralocks_core.training.hair_body import hair_body, posed_over_time
 
 from .. import rigs
 
@@ -40,3 +40,21 @@ def test_hair_beside_an_ear_is_outside():
     beside = EAR + way * [[0.03, 0.05, 0.04]]
     beside = beside[np.linalg.norm(beside - CENTRE, axis=1) > 0.105]
     assert Collider(coarse.points, coarse.triangles).distance(beside, limit=0.1)[0].min() > 0
+
+
+def test_a_body_posed_for_all_frames_is_posed_as_for_each():
+    """Vertices follow several joints, some of them twice; others follow none of the first."""
+    rng = np.random.default_rng(0)
+    weights = rng.uniform(size=(30, 3))
+    body = Body(
+        rng.normal(size=(30, 3)),
+        rng.integers(30, size=(10, 3)),
+        rng.choice([1, 3, 4], (30, 3)),
+        weights / weights.sum(axis=1, keepdims=True),
+        {"tall": rng.normal(size=(30, 3)), "wide": rng.normal(size=(30, 3))},
+    )
+    skinning = np.tile(np.eye(4), (7, 6, 1, 1))
+    skinning[..., :3, :] += 0.3 * rng.normal(size=(7, 6, 3, 4))
+    for shape in (None, np.array([0.5, -0.3])):
+        expected = [body.posed(each, shape) for each in skinning]
+        np.testing.assert_allclose(posed_over_time(body, skinning, shape), expected, atol=1e-5)

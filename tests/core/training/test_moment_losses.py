@@ -5,17 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull, cKDTree
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from neuralocks_core import rotation
-from neuralocks_core.materials import Material
+from neuralocks_core.body.tree_search import surface_tree
+from neuralocks_core.character import Character
+from neuralocks_core.materials import MARGIN, Material
 from neuralocks_core.network_sizes import STRAND, K
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.moment_losses import moment_losses
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
-from neuralocks_core.training.moments import MomentPool
+from neuralocks_core.training.moments import MomentPool, nearest_planes
 from neuralocks_core.training.rollouts import TrainingScene
-from tests.core.rigs import person, straight_hair
+from tests.core.rigs import HEAD, bind, person, straight_hair
 
 OPTIONS = SelfSupervisedOptions(output="displacement", supported=False, random_materials=False, volume=0.0)
 AT = torch.tensor([4.0, 1.5, 1.0])[:, None, None] * 0.02 * torch.randn(K, 3, generator=torch.Generator().manual_seed(0))
@@ -98,10 +102,46 @@ def test_hair_is_kept_as_far_from_the_body_as_it_may_be(pool):
     assert pushed[0] == 0 < pushed[1] < 0.5 * pushed[2]
 
 
+def test_a_body_that_only_reaches_behind_a_point_does_not_touch_it():
+    """As a shoulder does under the chin. One vertex whose normal points up."""
+    touched = {(0, -0.03, 0): True, (0.03, -0.005, 0): False, (0.01, -0.002, 0): True, (0.03, 0.005, 0): True}
+    touched |= {(0, -0.045, 0): False, (0, 0.045, 0): False}
+    planes, _ = nearest_planes(cKDTree(np.zeros((1, 3))), np.array([[0.0, 1.0, 0.0]]), np.array(list(touched)))
+    assert (planes[:, 1] == 1).tolist() == list(touched.values())
+    assert (planes[:, 3] < -100).tolist() == [not each for each in touched.values()]
+
+
+def test_hair_is_tied_to_the_same_vertices_of_its_locks_other_strands(pool):
+    hair, groom = pool.hair[0], pool.scene.grooms[0]
+    tied, mate = hair.neighbours.numpy(), hair.neighbours.numpy() // K
+    strand, vertex, _ = np.nonzero(tied >= 0)
+    assert len(strand) and (tied[tied >= 0] % K == vertex).all()
+    lock = groom.lock[hair.strands]
+    assert (lock[mate[tied >= 0]] == lock[strand]).all() and (mate[tied >= 0] != strand).all()
+
+
+def test_hair_that_rests_near_the_body_may_stay_there():
+    points, _ = _sphere(0.0882)
+    head = bind()[HEAD, :3, 3]
+    faces = ConvexHull(points).simplices
+    inward = (np.cross(*np.diff(points[faces], axis=1).swapaxes(0, 1)) * points[faces[:, 0]]).sum(axis=1) < 0
+    faces[inward] = faces[inward, ::-1]
+    body = Body(points + head, faces, np.full((len(points), 1), HEAD), np.ones((len(points), 1)))
+    scene = TrainingScene(Character(person().skeleton, body), (straight_hair(),), frames=40, strands=16)
+    near = MomentPool(scene, volume=False)
+    near.grow()
+    margin = near.hair[0].margin.numpy()
+    assert margin[:, 0] == pytest.approx(0.0018, abs=5e-4) and (margin[:, -1] == np.float32(MARGIN)).all()
+
+
 def _ball(radius):
     """Vertices of a ball around the head joint in a tree, and their normals."""
-    from neuralocks_core.body.tree_search import surface_tree
+    points, normals = _sphere(radius)
+    return surface_tree(points), normals
 
-    way = np.random.default_rng(0).normal(size=(2000, 3))
+
+def _sphere(radius):
+    """Points on a sphere, and its normals there."""
+    way = np.random.default_rng(0).normal(size=(4000, 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)
-    return surface_tree(radius * way), way
+    return radius * way, way
