@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hair on bodies of other shapes, and which bodies a training has seen."""
+
+import numpy as np
+import pytest
+import trimesh
+
+pytest.importorskip("torch", reason="the extra 'train' is not installed")
+
+from neuralocks_core import rotation
+from neuralocks_core.character import Character
+from neuralocks_core.measures import MEASURES, body_measures
+from neuralocks_core.skinned_body import Body
+from neuralocks_core.training.rollouts import SHAPES, RolloutMaker, TrainingScene, learned_measures
+from tests.core.rigs import HEAD, bind, person, straight_hair
+
+RADIUS = 0.09
+BALL = trimesh.creation.icosphere(4, RADIUS)
+
+
+def headed(turn=None):
+    """A ball as the head of a humanoid that is turned as a whole; shapes make the ball larger, and move it forward."""
+    turn = np.eye(3) if turn is None else turn
+    points, count = (BALL.vertices + bind()[HEAD, :3, 3]) @ turn.T, len(BALL.vertices)
+    shapes = {"large": 0.4 * BALL.vertices @ turn.T, "forward": np.tile(turn[:, 2] * 0.1, (count, 1))}
+    body = Body(points, BALL.faces, np.full((count, 1), HEAD), np.ones((count, 1)), shapes)
+    return Character(person(turn).skeleton, body)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.2])
+def test_roots_follow_the_scalp_hair_on_it_the_scalp_below_and_free_hair_its_root(yaw):
+    maker = RolloutMaker(TrainingScene(headed(rotation.from_vector([0, yaw, 0])), (straight_hair(),)))
+    angle, away = np.linspace(0.2, 1.5, 24), RADIUS + np.linspace(0, 2, 24)[:, None]
+    lying = RADIUS * np.stack([0 * angle, np.cos(angle), np.sin(angle)], axis=1)
+    rest = np.stack([lying, away * lying[0] / RADIUS])
+    assert maker.fitted(rest, np.zeros(2)) is rest
+    larger = maker.fitted(rest, np.array([0.5, 0.0]))
+    np.testing.assert_allclose(larger[0], 1.2 * lying, atol=2e-3)
+    np.testing.assert_allclose(larger[1, 0], 1.2 * lying[0], atol=2e-3)
+    np.testing.assert_allclose(larger[1, -1] - rest[1, -1], larger[1, 0] - rest[1, 0], atol=1e-9)
+    both = maker.fitted(rest, np.array([0.5, 0.3]))
+    np.testing.assert_allclose(both - larger, np.broadcast_to([0, 0, 0.03], rest.shape), atol=1e-9)
+
+
+def test_a_training_has_seen_the_bodies_between_the_extremes_of_each_shape():
+    """The forward shape reaches farther to the front; both together go beyond what each does."""
+    character = headed()
+    seen = dict(zip(MEASURES, learned_measures(character).T))
+    front, width = seen["head front"], seen["head half width"]
+    still = dict(zip(MEASURES, body_measures(character)))
+    assert front[0] < still["head front"] - SHAPES * 0.1 + 1e-9 and front[1] > still["head front"] + SHAPES * 0.1 - 1e-9
+    large = np.array([-1, 1]) * SHAPES * 0.4
+    assert width == pytest.approx(still["head half width"] * (1 + large), rel=1e-6)
+    for shape in np.random.default_rng(1).uniform(-SHAPES, SHAPES, (20, 2)):
+        assert abs(body_measures(character, shape)[2] - np.mean(front)) < 1.02 * np.ptp(front) / 2
