@@ -6,7 +6,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from neuralocks_core.materials import MARGIN, NO_PLANE
+from neuralocks_core.materials import MARGIN
 from neuralocks_core.network_sizes import K
 from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.regression_options import RegressionOptions
@@ -56,7 +56,6 @@ def regression_losses(net: StrandNet, batch: dict[str, Tensor], options: Regress
     normals, offset = batch["planes"][..., :3], batch["planes"][..., 3]
     target = (normals * batch["moved"]).sum(-1) - offset
     depth = torch.relu(target.clamp_max(MARGIN) - (normals * moved).sum(-1) + offset)
-    depth = torch.where(offset > NO_PLANE[3] / 10, depth, torch.zeros_like(depth))
     return {
         "position": options.position * position.mean(),
         "velocity": options.velocity * velocity.mean(),
