@@ -8,6 +8,7 @@ import numpy as np
 from neuralocks_core.anatomy.humanoid import Humanoid, NoHead, find_humanoid
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
+from neuralocks_core.rotation import flat
 
 from ..border.placement import Placement
 from ..skel.stage_rig import StageRig
@@ -44,13 +45,14 @@ def followed_joint(rig: StageRig, placement: Placement) -> tuple[int, np.ndarray
     if not len(rows):
         return None
     below, joints = character.of_head, rig.clip.joints[rows]
-    if _still(places) or any(_still(np.linalg.inv(joints[:, joint]) @ places) for joint in np.flatnonzero(~below)):
+    seen = ~flat(joints[..., :3, :3]).any(axis=0)  # what a scale of zero hides carries no hair
+    others = np.flatnonzero(seen & ~below)
+    if _still(places) or any(_still(np.linalg.inv(joints[:, joint]) @ places) for joint in others):
         return None
-    for joint in np.flatnonzero(below):  # parents come first
-        if np.linalg.det(joints[:, joint]).all():
-            way = character.skeleton.bind[joint] @ np.linalg.inv(joints[:, joint]) @ places
-            if _still(way):
-                return int(joint), way[0]
+    for joint in np.flatnonzero(seen & below):  # parents come first
+        way = character.skeleton.bind[joint] @ np.linalg.inv(joints[:, joint]) @ places
+        if _still(way):
+            return int(joint), way[0]
     return None
 
 
@@ -113,8 +115,8 @@ def head_by_name(rig: StageRig) -> int | None:
 
 
 def _rides_along(rig: StageRig, joint: int, head: int) -> bool:
-    """Whether a joint below the head never moves relative to it."""
-    joints = rig.clip.joints
+    """Whether a joint below the head never moves relative to it, as long as no scale of zero hides that."""
+    joints = rig.clip.joints[~flat(rig.clip.joints[:, head, :3, :3])]
     return _still(np.linalg.inv(joints[:, head]) @ joints[:, joint])
 
 

@@ -5,6 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from neuralocks_core.rotation import flat
+
 from ..border.placement import Placement
 from ..skel.stage_rig import StageRig
 from ..skel.surface import StageMesh
@@ -52,14 +54,14 @@ def ways(
     if not rig.source.animated:
         return still if likely else []
     if when is not None:  # it is seen where it is then
-        return [_posed(rig, placement, when)] if likely else still
+        return (_posed(rig, placement, when) or still) if likely else still
     with_skeleton, with_head = drifts or drifts_of(rig, placement)
     if with_skeleton <= STEADY:
         return still if likely else _elsewhere(rig, placement)
     # A prim that is moved along by its parents: where it stood relative to the head when that motion began.
-    posed = [_posed(rig, placement, placement.samples[0])]
+    posed = _posed(rig, placement, placement.samples[0])
     if with_head <= STEADY:
-        return posed if likely else still
+        return (posed or still) if likely else still
     # A set carries along what stands and walks in it; only what nearly keeps to the head was made on it.
     both = posed + still if CLEARLY * with_head < with_skeleton else still + posed
     return both if likely else []
@@ -70,7 +72,7 @@ def _elsewhere(rig: StageRig, placement: Placement) -> list[np.ndarray]:
     the shot begins.
     """
     codes = dict.fromkeys([*lone_sample(placement.prim), *placement.lone_samples, *beginnings(rig)])
-    return [_posed(rig, placement, code) for code in codes]
+    return [way for code in codes for way in _posed(rig, placement, code)]
 
 
 def rest_way(rig: StageRig, placement: Placement, when: float | None, drifts: tuple[float, float] | None):
@@ -89,9 +91,12 @@ def beginnings(rig: StageRig) -> list[float]:
     return [first, start] if first < start <= last else [first]
 
 
-def _posed(rig: StageRig, placement: Placement, when: float) -> np.ndarray:
-    """The way of a groom that lies right on the head as it is at a time code."""
-    return np.linalg.inv(rig.carrying_at(when)) @ rig.border.to_core @ placement.at(when)
+def _posed(rig: StageRig, placement: Placement, when: float) -> list[np.ndarray]:
+    """The way of a groom that lies right on the head as it is at a time code; none if a scale of zero hides the head then."""
+    carrying = rig.carrying_at(when)
+    if flat(carrying[:3, :3]):
+        return []
+    return [np.linalg.inv(carrying) @ rig.border.to_core @ placement.at(when)]
 
 
 def drifts_of(rig: StageRig, placement: Placement) -> tuple[float, float]:
@@ -110,12 +115,16 @@ def drifts_of(rig: StageRig, placement: Placement) -> tuple[float, float]:
 
 
 def _drift(placement: Placement, against: Callable[[float], np.ndarray], about: float) -> float:
-    """How much a moving prim moves relative to something else in stage space, as a share: 0 if that is what moves it; `about` is
-    ABOUT in units of the stage.
+    """How much a moving prim moves relative to something else in stage space, as a share: 0 if that is what moves it; infinity if a
+    scale of zero hides that all the while. `about` is ABOUT in units of the stage.
     """
     times = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)]
-    places = np.stack([placement.at(time) for time in times])
-    relative = np.linalg.inv(np.stack([against(time) for time in times])) @ places
+    places, others = (np.stack([at(time) for time in times]) for at in (placement.at, against))
+    seen = ~flat(others[:, :3, :3])
+    if not seen.any():
+        return np.inf
+    places = places[seen]
+    relative = np.linalg.inv(others[seen]) @ places
     turned, moved = (np.abs(relative - relative[0])[..., part].max() for part in (slice(3), 3))
     far = np.abs(places[..., 3]).max()
     reach = max(1.0, min(far, about), ROUNDED * far, np.abs(relative[..., 3]).max())

@@ -107,6 +107,37 @@ def test_hair_that_moves_relative_to_its_head_is_told(tmp_path, unit, moved):
     assert [told in note for note in read_shot(path).notes if "its own transform" in note] == [True] * (moved > 0.01)
 
 
+def _hidden_at(folder, joint: int, code: int, moves: bool, bound: str):
+    """A shot in which a scale of zero hides a joint at a frame; hair moves with the head, or stands still."""
+    path = write_shot(folder, Recipe(bound=bound))
+    rig, stage = read_shot(path).rigs[0], Usd.Stage.Open(str(path))
+    ways = [rig.joints_at(frame)[HEAD] @ np.linalg.inv(rig.joints_at(1)[HEAD]) for frame in range(1, 10)]
+    op = UsdGeom.Xformable(stage.GetPrimAtPath("/Hero/Hair")).AddTransformOp()
+    scales = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion")).GetScalesAttr()
+    scales.Clear()
+    for frame, way in enumerate(ways, 1):
+        if moves:
+            op.Set(Gf.Matrix4d(way.T.tolist()), frame)
+        scales.Set(Vt.Vec3hArray([Gf.Vec3h(each != joint or frame != code) for each in range(len(JOINTS))]), frame)
+    stage.Save()
+    return path
+
+
+def test_a_hidden_hand_takes_no_hair_from_the_head_that_it_follows(tmp_path):
+    (item,) = read_shot(_hidden_at(tmp_path, JOINTS.index(f"{JOINTS[4]}/elbow_L"), 5, True, "mesh")).grooms
+    assert item.joint == JOINTS[HEAD] and "its own transform follows" in item.attachment.how
+
+
+@pytest.mark.parametrize(("joint", "head"), [(HEAD, None), (HEAD - 1, None), (HEAD - 1, "neck")])
+@pytest.mark.parametrize(
+    ("code", "moves", "bound"), [(1, False, "mesh"), (5, False, "own"), (5, True, "mesh"), (1, True, "none")]
+)
+def test_a_head_that_is_hidden_for_a_frame_is_told(tmp_path, joint, head, code, moves, bound):
+    path = _hidden_at(tmp_path, joint, code, moves, bound)
+    with pytest.raises(NeuralocksError, match=f"joint 'hips/spine/neck.*' has zero scale at time code {code}; give it"):
+        read_shot(path, head=head)
+
+
 def test_each_groom_finds_its_own_character(tmp_path):
     write_shot(tmp_path, Recipe(bound="mesh"), "asset")
     stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
