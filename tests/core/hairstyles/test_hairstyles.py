@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.hairstyles import MOST_STRANDS, STYLES, Obstacle, Scalp, from_head, grow
+from neuralocks_core.hairstyles import MOST_STRANDS, STYLES, Obstacle, Scalp, _site, from_head, grow
 from neuralocks_core.hairstyles.growth import Site
 from neuralocks_core.hairstyles.variation import Variation
 from neuralocks_core.mesh import across
@@ -152,6 +153,37 @@ def test_roots_cover_the_scalp_evenly():
     assert count.std() / count.mean() < 0.15
     np.testing.assert_allclose(np.linalg.norm(roots.normal, axis=1), 1.0, rtol=1e-6)
     assert ((roots.normal * (roots.place - CENTRE)).sum(axis=1) > 0.08).all()
+
+
+def test_scissors_cut_a_bob_straight_at_the_jaw():
+    tips = grow("bob", SCALP, 300, body=OBSTACLE).points.reshape(300, -1, 3)[:, -1]
+    low, high = np.percentile((tips[:, 1] - CENTRE[1]) / SCALP.radius, [1, 90])
+    assert -1.5 < low < high < -1.2
+
+
+def test_long_hair_falls_before_or_behind_the_shoulders():
+    """Falling straight, it spreads over the arms."""
+    points = (grow("long_straight", SCALP, 300, body=OBSTACLE).points - CENTRE) / SCALP.radius
+    assert np.percentile(np.abs(points[points[:, 1] < -2, 0]), 99) < 1.15
+
+
+def test_tips_gather_in_locks():
+    points = grow("pixie", SCALP, 2000, body=OBSTACLE).points.reshape(2000, -1, 3)
+    root, tip = (np.median(cKDTree(place).query(place, 2)[0][:, 1]) for place in (points[:, 0], points[:, -1]))
+    assert tip < 0.8 * root
+
+
+def test_no_lock_reaches_across_a_parting():
+    for style in (STYLES["bob"], STYLES["fringe"]):
+        site = _site(style, SCALP, 4000, np.random.default_rng(0), SCALP.radius / 0.1)
+        zone = style.zone(site.seen)
+        assert len(np.unique(zone)) > 1 and (zone == zone[site.guide]).all()
+
+
+def test_hair_thins_out_at_the_hairline():
+    border = SCALP.roots(4000, np.random.default_rng(0)).border
+    at_edge, within = (np.mean((low <= border) & (border < low + 0.003)) for low in (0.0, 0.012))
+    assert at_edge < 0.5 * within
 
 
 def test_a_scalp_is_measured_once(monkeypatch):
