@@ -79,6 +79,11 @@ def test_somebody_stands_a_twentieth_less_high_than_stretched_out(tmp_path):
     assert read_bvh(written(tmp_path, TEXT.replace("OFFSET 0 80 0", "OFFSET 0 140 0"))).unit == 0.01
 
 
+def test_the_end_of_the_head_counts_for_how_tall_somebody_is(tmp_path):
+    """A child of 1.3 m is one of 1.1 m up to the joint, too short to be taken for a person in centimetres."""
+    assert read_bvh(written(tmp_path, TEXT.replace("OFFSET 0 80 0", "OFFSET 0 20 0"))).unit == 0.01
+
+
 @pytest.mark.parametrize(
     ("old", "new", "fact"),
     [
