@@ -220,6 +220,7 @@ def test_a_scalp_is_marked_on_a_bare_head():
     assert ((seen[:, 2] < -0.8) & (seen[:, 1] < -0.1)).any()  # the back
     assert not ((seen[:, 2] > 0.7) & (seen[:, 1] < 0.3)).any()  # not the face
     assert not (seen[:, 1] < -0.9).any()
+    assert not ((np.abs(seen[:, 0]) > 0.8) & (seen[:, 1] < 0)).any()  # nor where ears are
     mirrored = np.sort(-seen[:, 0])
     np.testing.assert_allclose(mirrored, np.sort(seen[:, 0]), atol=0.05)
 
