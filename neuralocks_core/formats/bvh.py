@@ -188,9 +188,12 @@ def _motion_header(words: Words, joints: list[_Joint]) -> tuple[int, float]:
 
 
 def _values(words: Words, frames: int, width: int) -> np.ndarray:
-    values = words.numbers(frames * width) if frames * width <= words.left else ()
+    values, more = words.numbers(frames * width) if frames * width <= words.left else ((), False)
     if len(values) < frames * width:
         raise words.error(f"says {frames} frames, of which it holds fewer")
+    # A frame may go on in another line, and more frames may follow than are told; but no line holds a frame and a bit of another.
+    if more and (held := words.in_longest_line()) > width:
+        raise words.error(f"its joints have {width} channels, and a line of its frames holds {held} numbers")
     values = values.reshape(frames, width)
     bad = ~(np.abs(values) <= LARGEST).all(axis=1)
     if bad.any():

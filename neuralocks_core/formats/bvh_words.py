@@ -19,6 +19,7 @@ PIECE = 1 << 15
 """Bytes of the frames that are converted to numbers at a time, plus the rest of the line, at most twice as many."""
 _COMMENT = re.compile(rb"(?<![^\r\n])[ \t]*(?:#|//)[^\r\n]*")
 _WORD, _BREAK, _LINE = re.compile(_COMMENT.pattern + rb"|(\S+)"), re.compile(rb"\s"), re.compile(rb"[\r\n]")
+_ANY, _WHOLE_LINE = re.compile(rb"\S+"), re.compile(rb"[^\r\n]+")
 _UTF16 = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"H\0": "utf-16-le", b"\0H": "utf-16-be"}
 """First bytes of a file -> its encoding."""
 
@@ -90,9 +91,14 @@ class Words:
             raise self.error(f"says {word[:40]} {what}, where 0 to {highest} are possible")
         return int(word)
 
-    def numbers(self, most: int) -> np.ndarray:
-        """All that follows as numbers (n,), at most `most` of them."""
-        values, start = [np.zeros(0)], self._place
+    def in_longest_line(self) -> int:
+        """How many words the longest of all following lines holds; there is one."""
+        lines = _WHOLE_LINE.finditer(self._content, self._place)
+        return max(sum(1 for _ in _ANY.finditer(line[0])) for line in lines if not _COMMENT.fullmatch(line[0]))
+
+    def numbers(self, most: int) -> tuple[np.ndarray, bool]:
+        """All that follows as numbers (n,), at most `most` of them, and whether there is more."""
+        values, start, more = [np.zeros(0)], self._place, False
         while most and start < len(self._content):
             gap = _LINE.search(self._content, start + PIECE, start + 2 * PIECE)
             gap = gap or _BREAK.search(self._content, start + 2 * PIECE)
@@ -100,7 +106,8 @@ class Words:
             block = self._content[start:end]
             if b"#" in block or b"//" in block:
                 block = _COMMENT.sub(b"", block)
-            block = block.split()[:most]
+            block = block.split()
+            block, more = block[:most], len(block) > most
             if max(map(len, block), default=0) > LONGEST_NUMBER:
                 raise self.error(f"its frames hold a number of more than {LONGEST_NUMBER} characters")
             try:
@@ -108,4 +115,4 @@ class Words:
             except ValueError as error:
                 raise self.error(f"its frames hold something that is not a number ({str(error)[:80]})") from None
             start, most = end, most - len(block)
-        return np.concatenate(values)
+        return np.concatenate(values), more or _ANY.search(self._content, start) is not None

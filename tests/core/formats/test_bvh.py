@@ -106,6 +106,7 @@ def test_the_end_of_the_head_counts_for_how_tall_somebody_is(tmp_path):
         ("10 90 0", "10 # 90 0", "not a number"),
         ("10 90 0", "10 x 0", "not a number"),
         ("10 90 0", "10 inf 0", "frame 1"),
+        ("10 90 0", "10 90 0 7", "12 channels, and a line of its frames holds 13 numbers"),
         ("HIERARCHY", "MOTION", "HIERARCHY"),
         ("}\nMOTION", "MOTION", "MOTION"),
     ],
@@ -135,6 +136,13 @@ def test_what_other_programs_write_is_read(tmp_path, old, new):
     expected, found = (read_bvh(written(tmp_path, text)) for text in (TEXT, TEXT.replace(old, new, 1)))
     assert np.array_equal(found.clip.joints, expected.clip.joints)
     assert np.array_equal(found.clip.times, expected.clip.times)
+
+
+def test_frames_beyond_those_told_are_passed_over(tmp_path):
+    """Cut takes may keep them, and a frame may go on in another line."""
+    expected = read_bvh(written(tmp_path)).clip.joints
+    for more in ("20 90 0  0 0 0  0 0 0  0 0 0\n", "# 1 2 3 4 5 6 7 8 9 10 11 12 13\n20 90 0\n0 0 0", "\x1a"):
+        assert np.array_equal(read_bvh(written(tmp_path, TEXT + more)).clip.joints, expected)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
