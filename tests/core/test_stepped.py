@@ -121,6 +121,30 @@ def test_slow_motion_is_no_steps():
     assert (np.diff(joints[:, HEAD, 0, 3]) == 0).any() and Stepped.of(clip, [HEAD]).clip is clip
 
 
+def test_what_hardly_moves_on_twos_is_no_steps():
+    """A hundredth of a millimetre every second frame is slow motion, a tenth is a step."""
+    clip = shown(0 * FRAMES)
+    clip.joints[:, :, 0, 3] += 1e-5 * (FRAMES[:, None] // 2)
+    assert Stepped.of(clip, [HEAD]).clip is clip
+    clip.joints[:, :, 0, 3] *= 10
+    assert len(Stepped.of(clip, [HEAD]).held)
+
+
+def test_held_poses_far_from_the_origin_are_the_same_but_for_rounding():
+    clip = shown(FRAMES - FRAMES % 2, speed=0.0)
+    clip.joints[:, :, 0, 3] = np.float32(1e4)
+    clip.joints[1::4, :, 0, 3] = np.nextafter(np.float32(1e4), np.float32(np.inf))
+    np.testing.assert_array_equal(Stepped.of(clip, [HEAD]).clip.times, clip.times[::2])
+
+
+def test_a_head_on_twos_above_a_chest_on_ones_is_not_stepped():
+    """Hair reads both."""
+    clip, ones = shown(FRAMES - FRAMES % 2), shown(FRAMES)
+    assert len(Stepped.of(clip, [HEAD, 1]).held)
+    clip.joints[:, 1] = ones.joints[:, 1]
+    assert Stepped.of(clip, [HEAD, 1]).clip is clip
+
+
 def test_a_loop_keeps_its_period():
     for last in (48, 49):  # the last frame begins a pose, or holds it
         frames = np.arange(last + 1)

@@ -4,7 +4,16 @@
 import numpy as np
 import pytest
 
-from neuralocks_core.strands.locks import NEAR_RADIUS, NEAREST, lock_codes, lock_of_roots, neighbours
+from neuralocks_core.strands.locks import (
+    MATE_RADIUS,
+    MATES,
+    NEAR_RADIUS,
+    NEAREST,
+    lock_codes,
+    lock_mates,
+    lock_of_roots,
+    neighbours,
+)
 
 
 def scalp(strands, seed=0):
@@ -80,3 +89,17 @@ def test_neighbours_against_brute_force():
     expected = np.where(np.take_along_axis(distance, expected, 1) <= NEAR_RADIUS, expected, -1)
     assert (expected < 0).any() and (expected >= 0).any(axis=0).all()
     np.testing.assert_array_equal(found.reshape(-1, NEAREST), expected)
+
+
+def test_mates_are_the_nearest_strands_of_the_lock_along_their_length():
+    """Against brute force, on strands that part from each other the more the nearer their roots are."""
+    rng = np.random.default_rng(5)
+    roots, lock = rng.uniform(-0.01, 0.01, (18, 3)), np.arange(18) % 2
+    along = np.linspace(0, 1, 24)[:, None]
+    rest = roots[:, None] + along * (-3 * roots[:, None] + [0, 0.1, 0] + rng.normal(0, 0.01, (18, 1, 3)))
+    apart = np.linalg.norm(rest[:, None] - rest[None], axis=-1).mean(axis=-1)
+    apart[(lock[:, None] != lock) | np.eye(18, dtype=bool)] = np.inf
+    order = np.argsort(apart, axis=1)[:, :MATES]
+    near = np.take_along_axis(apart, order, axis=1) <= MATE_RADIUS
+    np.testing.assert_array_equal(lock_mates(rest, lock), np.where(near, order, -1))
+    assert near.any() and not near.all()

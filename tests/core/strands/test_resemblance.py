@@ -22,6 +22,12 @@ def test_hair_is_as_far_as_it_is_moved():
     assert far.distance(one.carried(aside)) == pytest.approx(0.05, abs=0.001)
 
 
+def test_hair_on_another_head_is_compared_from_the_middle_of_that():
+    far = np.array([0.0, 0.4, 0.3])
+    other = replace(STRANDS.carried(far.astype(np.float32)), head_centre=STRANDS.head_centre + far)
+    assert Learned(learned_hair([STRANDS])).distance(other) < 0.001
+
+
 def test_half_of_the_strands_decide():
     learned = Learned(learned_hair([STRANDS]))
     usable = np.flatnonzero(STRANDS.valid)

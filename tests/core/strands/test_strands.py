@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Resampling and scalp frames: a groom as the network sees it."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -8,7 +10,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.network_sizes import K
 from neuralocks_core.reference.rest import rest_rods
 from neuralocks_core.strands.centreline import centre_lines
-from neuralocks_core.strands.strand_set import root_frames, root_uv, scalp_local, strand_set
+from neuralocks_core.strands.strand_set import StrandSet, root_frames, root_uv, scalp_local, strand_set
 from tests.core.strands.odd_grooms import CENTRE, ORIGIN, ragged_groom
 
 
@@ -21,6 +23,33 @@ def test_samples_divide_the_arc_evenly():
         expected = np.stack([np.interp(np.linspace(0, arc[-1], K), arc, own[:, axis]) for axis in range(3)], axis=1)
         expected = centre_lines(expected[None])[0]
         np.testing.assert_allclose(strands.rest[s], expected - ORIGIN, atol=1e-6)
+
+
+def test_a_rig_that_faces_elsewhere_has_the_same_strands():
+    groom, turn = ragged_groom(), Rotation.from_rotvec([0.1, 2.0, -0.3]).as_matrix()
+    turned = replace(groom, points=(groom.points @ turn.T).astype(np.float32))
+    as_is, found = strand_set(groom, ORIGIN, CENTRE), strand_set(turned, turn @ ORIGIN, CENTRE, turn.T)
+    some = as_is.valid & found.valid
+    assert some.sum() > 100
+    np.testing.assert_allclose(found.rest[some], as_is.rest[some], atol=1e-6)
+    np.testing.assert_allclose(found.root_frame[some], as_is.root_frame[some], atol=1e-4)
+
+
+def test_whole_locks_are_taken_and_those_of_joined_grooms_stay_apart():
+    strands = strand_set(ragged_groom(), ORIGIN, CENTRE)
+    taken = strands.whole_locks(40)
+    assert len(taken) == 40 and strands.valid[taken].all() and set(strands.whole_locks(20)) < set(taken)
+    usable = np.flatnonzero(strands.valid)
+    parted = [
+        each
+        for each in np.unique(strands.lock[taken])
+        if (strands.lock[usable] == each).sum() != (strands.lock[taken] == each).sum()
+    ]
+    assert len(parted) <= 1 and len(np.unique(strands.lock[taken])) > 1
+    both = StrandSet.joined([strands, strands])
+    count = strands.lock.max() + 1
+    np.testing.assert_array_equal(both.lock, np.concatenate([strands.lock, strands.lock + count]))
+    np.testing.assert_array_equal(both.rest, np.concatenate([strands.rest, strands.rest]))
 
 
 def test_strands_without_length_get_a_harmless_stand_in():
