@@ -111,6 +111,16 @@ def test_hair_stays_out_of_a_turning_head():
     assert np.median(result.residual) < 2e-3
 
 
+def test_hair_meets_a_body_that_comes_from_afar():
+    """It was too far to be looked at before, and hair itself rests."""
+    straight = np.linspace(0.1, -0.15, 24)[None, :, None] * [0, 1.0, 0]
+    points, faces = sphere(0.05)
+    way = np.linspace([0.3, -0.1, 0], [0.02, -0.1, 0], 30)[:, None]
+    hair = simulate(straight, np.tile(np.eye(4), (30, 1, 1)), points + way, faces).points
+    assert np.linalg.norm(hair[:, 0] - way, axis=-1).min() > 0.05 * np.cos(np.pi / 24) - 0.002
+    assert hair[-1, 0, -1, 0] < -0.02
+
+
 def test_stiff_short_hair_is_solved_as_far_as_long_hair():
     """Its energy nearly vanishes while the terms that cancel in it do not, so that rounding exceeds any share of it."""
     rest = groom(curl=0)
