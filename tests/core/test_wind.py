@@ -138,3 +138,10 @@ def test_a_model_without_a_history_of_gravity_refuses_it(spec):
     assert not spec.feels_wind
     with pytest.raises(NeuralocksError, match="wind: this model is for held poses"):
         sampler.vectors([0.5], wind=Wind((1, 0, 0)))
+
+
+def test_a_wind_from_another_side_is_the_same_wind_turned():
+    times = np.linspace(0, 5, 40)
+    turn = rotation.from_vector([0.0, 0.7, 0.0])
+    mean = np.array([2.0, 0.5, -1.0])
+    np.testing.assert_allclose(Wind(turn @ mean, 0.8).at(times), Wind(mean, 0.8).at(times) @ turn.T, atol=1e-12)
