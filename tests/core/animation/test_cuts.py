@@ -39,6 +39,22 @@ def test_a_jump_and_a_turn_on_the_spot_are_cuts(rate, turned):
     assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[late][0]])
 
 
+@pytest.mark.parametrize("size", [0.01, 100.0])
+def test_the_size_of_a_head_changes_no_turn(size):
+    who, t, joints = walking()
+    joints[t > 1, who.head, :3, :3] = from_vector([0, 2.0, 0]) @ joints[t > 1, who.head, :3, :3]
+    joints[:, who.head, :3, :3] *= size
+    assert find_cuts(Clip(t, joints), who.head) == pytest.approx([t[t > 1][0]])
+
+
+def test_a_spin_that_begins_from_one_sample_to_the_next_is_no_cut():
+    """What follows the first step explains it."""
+    who, t, joints = walking()
+    spin = 2.0 * np.clip(np.arange(len(t)) - 23, 0, None)
+    joints[:, who.head, :3, :3] = from_vector(np.outer(spin, [0, 1, 0]))
+    assert not len(find_cuts(Clip(t, joints), who.head))
+
+
 @pytest.mark.parametrize("first", [1, 2, 3, -3, -2, -1])
 def test_cuts_near_the_ends_are_found(first):
     """A bind pose for a frame or two before the action, which starts elsewhere, is common."""
