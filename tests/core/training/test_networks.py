@@ -152,6 +152,26 @@ def test_a_static_network_does_not_read_the_history():
     assert not torch.equal(*offsets_of(_net(), torch.randn(4, STRAND), frames))
 
 
+def test_inputs_are_scaled_by_how_far_they_vary_the_history_less_and_details_no_farther():
+    """Stillness is exactly zero in the history, and stays so. A code's last components vary a hundredth as much as its first."""
+    generator = torch.Generator().manual_seed(0)
+    frames, strands = (torch.randn(400, size, generator=generator) * 3 + 2 for size in (100, STRAND))
+    strands[:, 3] *= 0.001
+    strands[:, 66] *= 0.001
+    net = StrandNet(100)
+    net.set_normalisation(strands, frames, HISTORY)
+    assert not net.frame_mean[HISTORY].any()
+    rms, spread = frames[:, HISTORY].square().mean(0).sqrt(), frames[:, :40].std(0)
+    torch.testing.assert_close(net.frame_scale[HISTORY], 0.25 / rms, rtol=1e-4, atol=0)
+    torch.testing.assert_close(net.frame_scale[:40], 1 / spread, rtol=1e-2, atol=0)
+    torch.testing.assert_close(net.frame_mean[:40], frames[:, :40].mean(0), rtol=1e-4, atol=1e-5)
+    largest = strands[:, 2:66].std(0).max().item()
+    assert net.strand_scale[3].item() == pytest.approx(50 / largest, rel=1e-2)
+    assert net.strand_scale[66].item() == pytest.approx(
+        1 / strands[:, 66].std().item(), rel=1e-2
+    )  # of the root normal, no code
+
+
 def test_an_input_that_never_varied_is_not_read():
     net = _net()
     frames = torch.zeros(2, 100)
