@@ -448,9 +448,11 @@ def test_an_end_marker_off_the_hair_is_not_believed(place):
     np.testing.assert_allclose(chains.bones, [along, 1.2 * along], atol=1e-12)
 
 
-def test_an_end_marker_of_hair_that_turns_is_believed():
-    """The skin goes with it."""
+@pytest.mark.parametrize("down", [[0, 0, 0], [-0.06, -0.05, 0]], ids=["all of it", "some of it"])
+def test_an_end_marker_of_hair_that_turns_is_believed(down):
+    """The skin goes with it, or a part of the skin."""
     aside, tip = np.array([0.05, 0, 0]), np.array([0, 1.54, -0.11])
     who = character([*tail("hair", 2), ("hair_2_end", "hair_2", tuple(tip + aside))])
-    mesh = skin(who, {"hair_1": [[0, 1.57, -0.105]] * 3, "hair_2": tip + aside * [[0.1], [0.5], [0.9]]})
+    along = np.array([[0.1], [0.1 if any(down) else 0.5], [0.9]])
+    mesh = skin(who, {"hair_1": [[0, 1.57, -0.105]] * 3, "hair_2": tip + aside * along + np.outer(down, [0, 1, 0])})
     np.testing.assert_allclose(find_chains(who, [mesh]).bones[1], aside, atol=1e-12)

@@ -107,6 +107,17 @@ def test_of_a_mesh_of_hair_all_is_hair():
     assert len(body) == len(skin.triangles) and not len(own)
 
 
+def test_what_shares_a_mesh_with_locks_is_judged_by_itself():
+    """A hat covers the crown as a cap of hair does, but is larger; eyes and a horn without skin are more than the lock beside them."""
+    hat = _ball(0.2, CENTRE, lambda points: points[:, 1] > 0.02)
+    parts = _parts(False) | {"hat": (*hat, ["head"] * len(hat[0]))}
+    worn = ["torso", "head", "hat", "cap", *TAILS], ["eye", "horn", TAILS[0]]
+    meshes, owners = zip(*(_mesh(parts, names) for names in worn))
+    kept = [owner[body[:, 0]] for owner, (body, _) in zip(owners, parted(WHO, meshes, MOVING))]
+    assert {part: int((kept[0] == part).sum()) for part in ("hat", "cap")} == {"hat": len(hat[1]), "cap": 0}
+    assert set(kept[1]) == {"eye", "horn"} and len(kept[1]) == len(parts["eye"][1]) + len(parts["horn"][1])
+
+
 def test_weights_that_bleed_decide_nothing():
     """A helmet with a vertex that a hair joint drives a little, and a lock with one that the chest does, as automatic weights give."""
     parts = _parts(False)
