@@ -88,7 +88,9 @@ def test_an_elfs_ears_do_not_lower_the_middle_of_its_head():
 
 
 def test_pigtails_on_joints_of_their_own_do_not_widen_a_robots_head():
-    """The head is connected to nothing, so that its own skin cannot be told by what it continues into."""
+    """The head is connected to nothing, so that its own skin cannot be told by what it continues into. If all of it is on such a joint,
+    that is no pigtail.
+    """
     head, trunk = _ball([0, 1.68, 0.02], 0.1, HEAD), _ball([0, 1.3, 0], 0.15, SPINE)
     bare = _dressed(head, trunk)
     skeleton = Skeleton(
@@ -99,6 +101,9 @@ def test_pigtails_on_joints_of_their_own_do_not_widen_a_robots_head():
     pigtails = [_ball([x, 1.7, 0], 0.15, len(bare.skeleton.names)) for x in (-0.4, 0.4)]
     who = replace(_dressed(head, trunk, *pigtails), skeleton=skeleton, humanoid=bare.humanoid)
     assert who.head_width == bare.head_width < 0.21 and who.skin.sum() == bare.skin.sum()
+    below = _ball([0, 1.68, 0.02], 0.1, len(bare.skeleton.names))
+    who = replace(_dressed(below, trunk), skeleton=skeleton, humanoid=bare.humanoid)
+    assert who.head_width == bare.head_width and who.skin.all()
 
 
 @pytest.mark.parametrize("worn", WORN)
