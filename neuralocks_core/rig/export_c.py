@@ -55,9 +55,9 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
     path = Path(path)
     if path.suffix not in (".h", ".hpp"):
         raise NeuralocksError(f"{path}: a header ends in .h or .hpp; choose such a name")
-    if re.search(r'^-|["\\\x00-\x1f]', path.name):
+    if re.search(r'^-|["\\\x00-\x1f\ud800-\udfff]', path.name):  # the last are bytes that are no letters
         raise NeuralocksError(
-            f"{path.name!r}: no #include or compiler can name it; choose a name without quotes, backslashes and a dash in front"
+            f"{path.name!r}: no #include or compiler can name it; choose one without quotes, backslashes, broken letters, a dash in front"
         )
     beside = example_beside(path)
     for file, what in ((path, "header"), (beside, "worked example")):

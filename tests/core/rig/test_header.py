@@ -110,8 +110,9 @@ def test_nobodys_own_file_is_written_over(tmp_path):
     with pytest.raises(NeuralocksError, match="hair.h: would be overwritten by the header"):
         export_c(random_model(), tmp_path / "hair.h")
     assert [file.read_text() for file in tmp_path.iterdir()] == ["int mine;\n"]
-    with pytest.raises(NeuralocksError, match="no #include or compiler can name it"):
-        export_c(random_model(), tmp_path / 'my "hair".h')
+    for name in ('my "hair".h', "hair\udcff.h"):
+        with pytest.raises(NeuralocksError, match="no #include or compiler can name it"):
+            export_c(random_model(), tmp_path / name)
     with pytest.raises(NeuralocksError, match="a dash in front"):
         export_c(random_model(), tmp_path / "-hair.h")
 
