@@ -20,6 +20,8 @@ def hidden_hair(folder: Path) -> None:
             (_keyed, ("disabled",)),
             (_vertex, ("excluded", "both")),
             (_below_keyed, ("disabled", "excluded")),
+            (_on_bone, ("excluded",)),
+            (_on_relative_bone, ("disabled",)),
         )
     ):
         shown = _baked(folder / f"{number}_shown.usdc", hang, lambda strands: None)
@@ -127,6 +129,18 @@ def _keyed(_rig, strands) -> None:
 def _vertex(rig, strands) -> None:
     strands.parent = scenes.body(rig)
     strands.parent_type = "VERTEX"
+
+
+def _on_bone(rig, strands) -> None:
+    head = rig.data.bones["head"]
+    strands.parent, strands.parent_type, strands.parent_bone = rig, "BONE", head.name
+    tail = head.matrix_local @ scenes.translation((0, head.length, 0))  # from where Blender counts
+    strands.matrix_parent_inverse = tail.inverted()
+
+
+def _on_relative_bone(rig, strands) -> None:
+    rig.data.bones["head"].use_relative_parent = True
+    strands.parent, strands.parent_type, strands.parent_bone = rig, "BONE", "head"
 
 
 def _below_keyed(rig, strands) -> None:
