@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..border.time_codes import on_frame
+from ..border.time_codes import NEAR, on_frame
 from ..shot.stage import StageGroom
 from .sample_layer import in_order
 
@@ -52,7 +52,8 @@ class Stencils:
 
     def terms(self, code: float) -> list[tuple[float, float]]:
         """(time code, weight per second) whose weighted sum of points is the velocity at `code`."""
-        step, slack = self._step, 1e-6
+        step = self._step
+        slack = NEAR * step  # samples of the animation may be rounded, and frames are not
         part = int(np.searchsorted(self._after - slack, code, side="right"))
         first = self._after[part - 1] if part else self._first
         last = self._before[part] if part < len(self._before) else self._last
@@ -60,7 +61,7 @@ class Stencils:
             first, last = self._last, np.inf
         elif self._blown and code < self._first - slack:
             first, last = -np.inf, self._first
-        room = (code - first) / step + slack, (last - code) / step + slack
+        room = (code - first) / step + NEAR, (last - code) / step + NEAR
         if min(room) >= 2:
             weights = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}
         elif min(room) >= 1:

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from tests.strand_models import write_random_model
 from usd.baking.bake import bake
@@ -26,6 +26,28 @@ def test_velocities_are_those_of_the_points(tmp_path, model):
     few = bake(shot, tmp_path / "few.usdc", model, frames=[4.5, 5.5]).path
     near = (samples(few, "points", at=5.5).astype(float) - samples(few, "points", at=4.5)) * 24
     assert np.linalg.norm(near - middle) < 0.1 * np.linalg.norm(near)
+
+
+@pytest.mark.parametrize("rounded", [2e-5, -2e-5])
+def test_velocities_do_not_depend_on_how_the_samples_of_the_animation_were_rounded(tmp_path, model, rounded):
+    """They may lie beside the frames, also where the animation begins and ends."""
+    shot, shifted = write_shot(tmp_path, Recipe(strands=6)), tmp_path / "rounded.usda"
+    layer = Sdf.Layer.CreateNew(str(shifted))
+    layer.TransferContent(Sdf.Layer.FindOrOpen(str(shot)))
+    for channel in layer.GetPrimAtPath("/Hero/Rig/Motion").attributes:
+        values = [
+            (code, layer.QueryTimeSample(channel.path, code)) for code in layer.ListTimeSamplesForPath(channel.path)
+        ]
+        for code, value in values:
+            layer.EraseTimeSample(channel.path, code)
+            layer.SetTimeSample(channel.path, code + rounded, value)
+    layer.startTimeCode, layer.endTimeCode = 1 + rounded, 9 + rounded
+    layer.Save()
+    exact, beside = (bake(path, path.with_suffix(".usdc"), model) for path in (shot, shifted))
+    assert beside.frames == exact.frames == list(range(1, 10))
+    for code in exact.frames:
+        one, other = (samples(done.path, "velocities", at=code) for done in (exact, beside))
+        assert np.abs(one - other).max() < 1e-3
 
 
 @pytest.mark.parametrize("rate", [1.0, 1000.0])
