@@ -68,12 +68,10 @@ class PlainCanvas:
         return result
 
     def _surface(self, seen: np.ndarray, colours: np.ndarray) -> list[tuple]:
-        """Samples of the triangles that face the camera, as in `_segments`."""
+        """Samples of the triangles in the picture, as in `_segments`; of both sides, because hair cards are open."""
         corners = seen[self._triangles]
-        (ax, ay), (bx, by) = (corners[:, 1, :2] - corners[:, 0, :2]).T, (corners[:, 2, :2] - corners[:, 0, :2]).T
         low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
-        inside = (high >= 0).all(axis=1) & (low < [self._wide, self._high]).all(axis=1)
-        shown = (ax * by - ay * bx < 0) & inside
+        shown = (high >= 0).all(axis=1) & (low < [self._wide, self._high]).all(axis=1)
         corners, tint = corners[shown], colours[self._triangles[shown]]
         size = np.ceil(1.5 * (high - low)[shown].max(axis=1)).clip(1, LONGEST).astype(int)
         result = []

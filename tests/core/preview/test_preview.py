@@ -127,6 +127,17 @@ def test_both_canvases_draw_the_same_picture():
     assert np.abs(pictures[0] - pictures[1])[covered[0] & covered[1]].mean() < 12
 
 
+@pytest.mark.parametrize("degrees", [0, 180])
+def test_a_hair_card_is_drawn_from_both_sides_without_opengl(degrees):
+    """As it is with OpenGL: where the back of a card should be, was what is behind it."""
+    card = CENTRE + 0.1 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    bare = replace(scene(1), triangles=np.array([[0, 1, 2], [0, 2, 3]]), body=lambda frame: card, body_rest=card)
+    with closing(Film(bare, 60, 80, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
+        camera, (body, tint, _, _) = film._camera(0, degrees), film.light(0, degrees)
+        drawn = film._canvas.draw(camera, body, np.full_like(tint, 1), np.zeros((0, 3)), np.zeros((0, 3)))
+    assert (drawn > 250).all(axis=2).mean() > 0.05
+
+
 def test_a_driver_that_gives_up_half_way_is_let_go(monkeypatch):
     gl_canvas = pytest.importorskip("neuralocks_core.preview.gl_canvas", reason="moderngl is not installed")
 
