@@ -105,9 +105,9 @@ class GlCanvas:
             self._large.use()
             self._large.clear()
             if body is not None:
-                self._fill(self._body, body, body_colours, moderngl.TRIANGLES)
+                self._fill(self._body, body - camera.eye, body_colours, moderngl.TRIANGLES)
             if len(hair):
-                self._fill(self._hair, hair, hair_colours, moderngl.LINES)
+                self._fill(self._hair, hair - camera.eye, hair_colours, moderngl.LINES)
             context.disable(moderngl.DEPTH_TEST)
             self._small.use()
             self._drawing.use(0)
@@ -153,10 +153,12 @@ def _context() -> moderngl.Context:
 
 
 def _view(camera: Camera, aspect: float) -> np.ndarray:
-    """Matrix (4, 4) that takes points (x, y, z, 1) [m] to OpenGL's clip space."""
+    """Matrix (4, 4) that takes points (x, y, z, 1) [m] from the eye, in world axes, to OpenGL's clip space.
+
+    Single precision, in which it draws, is coarse far from the origin.
+    """
     turned = np.eye(4)
     turned[:3, :3] = camera.axes.T
-    turned[:3, 3] = -camera.axes.T @ camera.eye
     distance = np.linalg.norm(camera.eye - camera.target)
     near, far = 0.2 * distance, 4 * distance
     zoom = 1 / np.tan(np.radians(ANGLE) / 2)

@@ -127,14 +127,16 @@ class ShadowMap:
     """
 
     def __init__(self, points: np.ndarray, area: np.ndarray):
-        self.points, self.area = points, area
+        # Single precision is coarse far from the origin.
+        self._middle = np.mean(points, axis=0)
+        self._points, self._area = (points - self._middle).astype(np.float32), area
         self._columns: dict[bytes, tuple] = {}
 
     def depth(self, queries: np.ndarray, towards: np.ndarray) -> np.ndarray:
         """Optical depth (Q,) of the hair in front of each query (Q, 3) [m]; light comes from `towards`."""
         axes, low, cell, summed = self._seen_from(towards)
         # One array per coordinate: several times as fast as rows of three.
-        place = (axes.T @ queries.T.astype(np.float32) - low[:, None]) / cell
+        place = (axes.T @ (queries - self._middle).T.astype(np.float32) - low[:, None]) / cell
         # Half a cell towards the light, or a vertex would be in its own shadow.
         place[0] += np.float32(0.5)
         last = np.array(summed.shape, np.float32)[:, None] - 1
@@ -163,13 +165,13 @@ class ShadowMap:
             side /= np.linalg.norm(side)
             # The axis towards the light comes first: whole layers are summed at once.
             axes = np.stack([towards, side, np.cross(towards, side)], axis=1).astype(np.float32)
-            seen = axes.T @ self.points.T.astype(np.float32)
+            seen = axes.T @ self._points.T
             low, high = seen.min(axis=1), seen.max(axis=1)
             cell = np.float32(max(CELL, float((high - low).max()) / MOST_CELLS))
             shape = ((high - low) / cell).astype(int) + 4
             low = low - np.float32(1.5) * cell
             index = np.ravel_multi_index(((seen - low[:, None]) / cell + np.float32(0.5)).astype(int), shape)
-            grid = np.bincount(index, self.area / cell**2, int(np.prod(shape))).reshape(shape).astype(np.float32)
+            grid = np.bincount(index, self._area / cell**2, int(np.prod(shape))).reshape(shape).astype(np.float32)
             np.minimum(grid, np.float32(MOST_DEPTH), out=grid)
             for layer in range(len(grid) - 2, -1, -1):
                 grid[layer] += grid[layer + 1]
