@@ -15,6 +15,8 @@ _FEW = 8
 """Points proven at a time."""
 _FEW_ENOUGH = 16
 """Up to this many points are each compared with every triangle before an index is built."""
+_NOTHING = 1e-14
+"""Six times the volume [m^3] up to which a part has none."""
 _AT_ONCE = 200_000
 """Pairs of a point and a triangle that are held in memory at once."""
 
@@ -34,7 +36,8 @@ def proven_distances(vertices: np.ndarray, triangles: np.ndarray, points: np.nda
     for part in _closed_parts(np.asarray(triangles, np.int64).tobytes()):
         corners = vertices[part]
         within = ((points >= corners.min(axis=(0, 1))) & (points <= corners.max(axis=(0, 1)))).all(axis=1)
-        if within.any() and _volume(corners) > 0:
+        # A line, as what a rig hides may be scaled to, encloses nothing but for rounding.
+        if within.any() and _volume(corners) > _NOTHING:
             some = points[within]
             distance = Collider(vertices, _in_reach(vertices, part, some)).distance(some)[0]
             result[within] = np.minimum(result[within], np.where(distance < 0, distance, np.inf))

@@ -2,10 +2,12 @@
 """Inside and outside by winding numbers, in meshes that cut through themselves too."""
 
 import numpy as np
+import pytest
 import trimesh
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.enclosed import enclosed, proven_distances, without_air
+from neuralocks_core.errors import NeuralocksError
 
 
 def test_a_ball_two_balls_and_an_open_one():
@@ -72,6 +74,21 @@ def test_what_is_scaled_to_a_point_is_no_surface():
     faces = np.concatenate([ball.faces, len(ball.vertices) + np.arange(6).reshape(2, 3)])
     np.testing.assert_array_equal(proven_distances(hidden, faces, points), wanted)
     assert proven_distances(ball.vertices, ball.faces, np.zeros((0, 3))).shape == (0,)
+    with pytest.raises(NeuralocksError, match="no triangle with an area"):
+        proven_distances(hidden, faces[-2:], points)
+
+
+@pytest.mark.parametrize("count", [10, 30], ids=["few points", "many"])
+def test_what_is_scaled_to_a_line_encloses_nothing(count):
+    """Rounding leaves it a volume, of either sign, and points beside a slanting line are within its bounds."""
+    ball, rng = trimesh.creation.icosphere(3, 0.1), np.random.default_rng(0)
+    points = rng.uniform(-0.12, 0.12, (count, 3))
+    wanted = proven_distances(ball.vertices, ball.faces, points)
+    for way in rng.normal(size=(8, 3)):
+        line = np.outer(ball.vertices[:, 0], 2 * way / np.linalg.norm(way))
+        faces = np.concatenate([ball.faces, len(line) + ball.faces])
+        found = proven_distances(np.concatenate([ball.vertices, line]), faces, points)
+        np.testing.assert_array_equal(found, wanted)
 
 
 def test_air_before_an_open_end_is_no_depth_and_what_is_enclosed_stays_as_deep():
