@@ -49,8 +49,10 @@ def simulate_xpbd(
     pass leaves; how stiff hair really is depends on the number of substeps.
 
     Args:
-        rest, head, body, triangles, material, dt, ahead, rest_support, bind_body, margin, gravity, wind, device, progress: as
-            in `solver.simulate`.
+        rest, head, triangles, material, dt, ahead, rest_support, bind_body, margin, gravity, wind, device, progress: as in
+            `solver.simulate`.
+        body: as in `solver.simulate`, but in all substeps that lead to a frame it is where that frame has it, as seen from the
+            head. Frames are read in order, the first twice.
         start: as in `solver.simulate`, but None is the rest shape.
         substeps: per frame; the wind is the same in all of them. Beyond a few hundred, errors grow again: single precision rounds
             away what gravity does in so short a step.

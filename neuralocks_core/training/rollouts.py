@@ -51,7 +51,7 @@ class TrainingScene:
         clips: motion to cut from, besides random motion; may be empty.
         spec: the network's inputs.
         seed: of all random choices.
-        frames: length of a rollout, in steps of `spec.dt`; with `clips`, longer than PREROLL.
+        frames: length of a rollout, in steps of `spec.dt`, at least 3; with `clips`, at least PREROLL + 2.
         strands: strands of a rollout, in whole locks.
         gestures: how often random motion has each of its gestures, as `random_motion.check_weights` takes it.
         held_out: draw what training never sees: other locks, other random numbers, and no `clips`, since training cuts from all
