@@ -200,6 +200,22 @@ def test_the_skin_of_the_head_moves_with_it_between_frames():
     assert np.abs(held - exact).max() < 1e-5
 
 
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_each_frame_of_the_body_is_read_once_in_order(substeps):
+    """It may be posed only then."""
+    points, faces = sphere()
+    read = []
+
+    class Posed(list):
+        def __getitem__(self, frame):
+            read.append(frame)
+            return super().__getitem__(frame)
+
+    head = np.tile(np.eye(4), (4, 1, 1))
+    simulate(groom(1), head, Posed([points] * 4), faces, substeps=substeps)
+    assert read == [0, 1, 2, 3]
+
+
 def longer(rest):
     """Rest points whose strands are a tenth longer from their second vertex on."""
     return np.concatenate([rest[:, :2], rest[:, 1:2] + 1.1 * (rest[:, 2:] - rest[:, 1:2])], axis=1)
