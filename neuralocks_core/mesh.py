@@ -13,7 +13,7 @@ WELDED = 1e-4
 SAME = 1e-7
 """Points this close [m] are the same one, apart from rounding."""
 _MIXED = np.array([1, -7046029254386353131, 1609587929392839161])
-"""Odd numbers whose multiples, modulo 2^64, give different integers for different places."""
+"""Odd numbers whose multiples, modulo 2^64, give different places different integers, but for one pair in about 2^64."""
 
 
 def across(corners: np.ndarray) -> np.ndarray:

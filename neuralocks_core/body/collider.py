@@ -49,7 +49,8 @@ class Collider:
         self._tree = surface_tree(samples)
 
     def distance(self, points: np.ndarray, limit: float = 0.03, proven: bool = True) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distance [m] (..., ), negative inside, and the unit direction (..., 3) in which it grows fastest.
+        """Signed distance [m] (..., ), negative inside, and the unit direction (..., 3) in which it grows fastest; zero on an edge
+        at which two sheets lie on each other, back to back.
 
         Args:
             points: (..., 3) [m].
