@@ -15,6 +15,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP, Clip, loop_turns
 
+from ..border.time_codes import NEAR
 from ..border.units import Border
 from .bind_world import bind_shown
 from .blend_shapes import all_shares
@@ -121,8 +122,9 @@ class StageRig:
                 f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
                 "a loop must end with the pose that it begins with"
             )
-        # Subframes of the last frame lie past the end, too.
-        if len(codes) and (codes[0] < start or codes[-1] >= end + self.border.frame):
+        # Subframes of the last frame lie past the end, too, and samples may be rounded.
+        near = NEAR * self.border.frame
+        if len(codes) and (codes[0] < start - near or codes[-1] >= end + self.border.frame - near):
             notes.append(
                 f"{self.path}: its animation goes from {start:g} to {end:g}; outside that range the hair goes on with the "
                 "loop while the body stands still, so bake one cycle and repeat it"

@@ -69,6 +69,9 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     for frames in ("0:9", "1:10"):
         (note,) = closed.loop_notes(time_codes(frames, 1, 9))
         assert "goes from 1 to 9" in note
+    for rounded in (-2e-5, 2e-5):
+        beside = replace(closed, time_codes=closed.time_codes + rounded)
+        assert [len(beside.loop_notes(time_codes(frames, 1, 9))) for frames in ("1:9", "0:9", "1:10")] == [0, 1, 1]
     (note,) = rig.loop_notes()
     assert "/Hero/Rig" in note and "time codes 1 and 9" in note
     turned = rig.clip.joints[[0, 0]]
