@@ -4,6 +4,7 @@
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from ..border.time_codes import NEAR
 from .recorded import recorded
 
 
@@ -21,7 +22,7 @@ def gaps(codes: list[float], frame: float, stage: Usd.Stage | None = None) -> li
     steps = np.diff(frames)
     usual = np.median(steps) if len(steps) > 1 else frame
     found = [f"between {frames[i]:g} and {frames[i + 1]:g}" for i in np.flatnonzero(steps > 1.5 * usual)]
-    missed = usual * (1 - 1e-6)  # a shot may begin and end off a frame; less than a step is not a gap
+    missed = usual - NEAR * frame  # a shot may begin and end off a frame; less than a step is not a gap
     found = ([f"before {codes[0]:g}"] if codes[0] - first >= missed else []) + found
     return found + ([f"after {codes[-1]:g}"] if last - frames[-1] >= missed else [])
 

@@ -296,3 +296,13 @@ def test_less_than_a_frame_at_the_ends_of_a_shot_is_no_gap(tmp_path, model, rate
     whole = bake(path, tmp_path / "whole.usdc", model)
     joined = join(parts_of(path, tmp_path, model, parts), tmp_path / "hair.usdc")
     assert joined.frames == whole.frames and not joined.notes
+
+
+@pytest.mark.parametrize(("frames", "missed"), [("1:8", "after 8"), ("2:9", "before 2")])
+def test_a_frame_that_the_range_of_the_shot_only_has_up_to_rounding_is_missed(tmp_path, model, frames, missed):
+    path = write_shot(tmp_path, Recipe(strands=6))
+    layer = Sdf.Layer.FindOrOpen(str(path))
+    layer.startTimeCode, layer.endTimeCode = 1.00002, 8.99998
+    layer.Save()
+    joined = join(bake(path, tmp_path / "part.usdc", model, frames=frames).path, tmp_path / "hair.usdc")
+    assert joined.notes == [f"no part has samples {missed}"] and not joined.complete
