@@ -109,7 +109,7 @@ def bake(
 
     moved = [(each, [item.attachment for item in items]) for each, items in models]
     untrue = {note for each in moved for note in learned(*each)}
-    known = known_notes(shot, codes, loop, (loop or shot.cuts is None) and bool(groom_models.asked.spec.bins))
+    known = known_notes(shot, codes, loop, bool(groom_models.asked.spec.bins))
     notes = [
         *(note for note in known if note not in untrue),
         *dict.fromkeys(note for each, its in moved for note in model_notes(each, look, its, strength)),

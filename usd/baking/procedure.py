@@ -3,7 +3,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
@@ -54,8 +54,10 @@ def read_asked(
     if isinstance(shot, Shot):
         if late := [name for name, value in {**how, "cuts": cuts}.items() if value is not None]:
             raise NeuralocksError(f"{shot.path}: is read already, so '{late[0]}' comes too late; give it to read_shot")
-        for rig in shot.rigs:
-            given_cuts(shot.given_cuts(rig), loop)
+        if loop and any(len(rig.clip.cuts) for rig in shot.rigs):
+            raise NeuralocksError(f"{shot.path}: was read with cuts, and a loop has none; give cuts=[] to read_shot")
+        if loop:
+            shot = replace(shot, cuts=[])
     else:
         shot = read_shot(shot, **how, cuts=given_cuts(cuts, loop), still=wind is not None)
     check_frames_named(shot.path, frames, shot.first, shot.last, shot.rigs)
@@ -63,13 +65,14 @@ def read_asked(
     return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame, samples)
 
 
-def known_notes(shot: Shot, codes: list[float], loop: bool, cuts: bool) -> list[str]:
-    """Notes for the user before hair is posed at time codes; with `cuts`, also on where it starts anew."""
+def known_notes(shot: Shot, codes: list[float], loop: bool, dynamic: bool = True) -> list[str]:
+    """Notes for the user before hair is posed at time codes; if it is `dynamic`, also on where it starts anew, unless the user said so."""
+    found = [rig for rig in shot.rigs if dynamic and (loop or shot.given_cuts(rig) is None)]
     return [
         *shot.notes,
         *asked_notes(shot.stage, shot.rigs, codes, loop),
         *(text for rig in shot.rigs if loop for text in rig.loop_notes(codes)),
-        *(text for rig in shot.rigs if cuts for text in rig.cut_notes(loop)),
+        *(text for rig in found for text in rig.cut_notes(loop)),
         *few(
             [text for item in shot.grooms for text in hidden(item.prim, codes, shot.border.frame)],
             "grooms are baked already",

@@ -111,7 +111,7 @@ def simulate(
     def facts(item: StageGroom) -> dict:
         return alike | given_facts(shot.given_cuts(item.attachment.rig), shot.joints)
 
-    notes = known_notes(shot, codes, loop, loop or shot.cuts is None)
+    notes = known_notes(shot, codes, loop)
     if xpbd and look.clumping != Material().clumping:
         notes.append("XPBD does not tie the strands of a lock together: the material's clumping does nothing")
 

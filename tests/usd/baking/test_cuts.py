@@ -69,6 +69,24 @@ def test_a_shot_that_was_read_has_its_cuts_and_joints(shots, bakes, model, tmp_p
     np.testing.assert_array_equal(samples(out, "points", at=CUT), given)
 
 
+def test_a_shot_that_was_read_is_a_loop_only_without_cuts(shots, model, tmp_path):
+    """As one that is read for the loop: cuts that were found would be in its velocities."""
+    with pytest.raises(NeuralocksError, match=r"was read with cuts, and a loop has none; give cuts=\[\] to read_shot"):
+        bake(read_shot(shots[0]), tmp_path / "loop.usdc", model, loop=True)
+    path = write_loop(tmp_path)
+    outs = [
+        bake(shot, tmp_path / "hair.usdc", model, frames="1:2", loop=True).path.read_bytes()
+        for shot in (path, read_shot(path))
+    ]
+    assert outs[0] == outs[1]
+
+
+def test_cuts_that_are_found_are_told_also_where_another_character_has_given_ones(shots, model, tmp_path):
+    shot = read_shot(shots[0], cuts={"/Other/Rig": [5.0]})
+    notes = bake(shot, tmp_path / "hair.usdc", model, frames=[CUT]).notes
+    assert any(note.startswith("/Hero/Rig: its head jumps to another place at 13;") for note in notes)
+
+
 def test_hair_starts_anew_after_a_cut(bakes):
     assert any(note.startswith("/Hero/Rig: its head jumps to another place at 13;") for note in bakes["found"].notes)
     assert not any("another place" in note for name in ("given", "none", "after") for note in bakes[name].notes)
