@@ -64,9 +64,8 @@ class RigArrays:
         """
         found = []
         for word in filter(None, map(str.strip, text.split(","))):
-            named = zip(self.paths, self.bones, strict=True)
-            hits = [path for path, bone in named if bone == word or word not in self.bones and fnmatchcase(bone, word)]
-            found += hits or [word]
+            matches = str.__eq__ if word in self.bones else fnmatchcase
+            found += [path for path, bone in zip(self.paths, self.bones, strict=True) if matches(bone, word)] or [word]
         return found
 
     def by_hand(self) -> dict[str, str]:
