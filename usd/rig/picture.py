@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rigged mesh hair as a preview draws it: the skinned meshes of its character, hair separate from skin."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import connected_pieces
 from neuralocks_core.preview.film import Scene
+from neuralocks_core.rig.parting import parted
+from neuralocks_core.rig.rigging import moving_joints
 from neuralocks_core.rotation import transformed
+from neuralocks_core.skinned_body import Body
 
-from .stage import RiggedHair
+from .stage import RiggedHair, core_meshes
 
 MOST = 0.3
 """If at least this share of a connected mesh piece's vertices is hair, all of the piece is."""
@@ -21,18 +26,21 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
         NeuralocksError: the skeleton skins no mesh.
     """
     source = rigged.source
-    character, clip, body = source.character, source.clip, source.character.body
-    if body is None:
+    character, clip = source.character, source.clip
+    if character.body is None:
         raise NeuralocksError(
             f"{source.path}: it skins no mesh that is shown, so there is nothing to draw; show it, or bind the hair to it"
         )
-    skin = rigged.rig.character.body
-    hair = np.ones(len(body.points), bool)
-    if skin is not None:
-        hair[skin.triangles] = False
+    body = Body.joined([character.body, *rigged.elsewhere])
+    hair = np.arange(len(body.points)) < len(character.body.points)
+    meshes, start = core_meshes(source), 0
+    for mesh, (skin, _) in zip(meshes, parted(character, meshes, moving_joints(character.skeleton, rigged.rig.chains))):
+        hair[start + skin] = False
+        start += len(mesh.points)
     # In a mesh that is skin and hair, roots of locks ride on the head.
     piece = connected_pieces(body.triangles, len(body.points))
     hair |= (np.bincount(piece, hair) / np.bincount(piece) > MOST)[piece]
+    character = replace(character, body=body)
     return Scene(
         times=clip.times,
         head=np.stack([character.carrying(joints) for joints in clip.joints]),

@@ -17,6 +17,7 @@ from neuralocks_core.rig.finding import NoHairChains, fits
 from neuralocks_core.rig.measuring import UNEVEN, placed_chains
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.skinned_mesh import SkinnedMesh
+from neuralocks_core.skinned_body import Body
 
 from ..border.amounts import check_names
 from ..border.damage import names_damage
@@ -27,7 +28,7 @@ from ..border.units import Border
 from ..shot.lacking import has_hair_joints, nothing_found
 from ..shot.notes import partial_body
 from ..shot.others import Others
-from ..shot.whole_body import whole_body
+from ..shot.whole_body import parts_elsewhere
 from ..skel.source import find_skeletons, read_rig
 from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins
@@ -48,6 +49,7 @@ class RiggedHair:
         border: its units.
         source: skeleton, body and clip as read.
         rig: hair and body, separated.
+        elsewhere: meshes of the same person that other skeletons skin, on the joints of this one.
         others: other skeletons with hair chains, from which this one was chosen.
     """
 
@@ -55,6 +57,7 @@ class RiggedHair:
     border: Border
     source: StageRig = field(repr=False)
     rig: HairRig = field(repr=False)
+    elsewhere: tuple[Body, ...] = field(default=(), repr=False)
     others: tuple[str, ...] = ()
 
     @property
@@ -169,9 +172,11 @@ def _on_whole_bodies(found: list[RiggedHair], others: list[StageRig]) -> list[Ri
     """Hair that may touch all meshes of its character, which may be in several skeletons; the hair of these is no body."""
     hairless, result = [replace(hair.source, character=hair.rig.character) for hair in found], []
     for hair, own in zip(found, hairless):
-        body, left = whole_body(own, [*hairless, *others])
+        parts, left = parts_elsewhere(own, [*hairless, *others])
         hair.source.notes.extend(partial_body(own, left))
-        result.append(replace(hair, rig=hair.rig.with_body(body)))
+        body = own.character.body
+        body = Body.joined([*([] if body is None else [body]), *parts]) if parts else body
+        result.append(replace(hair, rig=hair.rig.with_body(body), elsewhere=tuple(parts)))
     return result
 
 

@@ -7,16 +7,17 @@ import trimesh
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.rig.evaluate import evaluate_rig
+from usd.rig.picture import rigged_scene
 from usd.rig.stage import read_rigged_hair
 
 from ..rig_shots import small_shot
 
 
-def _ball(stage, path: str, skeleton) -> None:
+def _ball(stage, path: str, skeleton, at=(0, 1.52, -0.02)) -> None:
     """A head without a scalp around the tail's first joints, moved by the second joint of a skeleton."""
     ball, mesh = trimesh.creation.icosphere(subdivisions=2, radius=0.09), UsdGeom.Mesh.Define(stage, path)
     ball.update_faces((ball.triangles[:, :, 1] < 0.8 * 0.09).all(axis=1))
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy((ball.vertices + [0, 1.52, -0.02]).astype(np.float32)))
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy((ball.vertices + at).astype(np.float32)))
     mesh.CreateFaceVertexCountsAttr([3] * len(ball.faces))
     mesh.CreateFaceVertexIndicesAttr(ball.faces.ravel().tolist())
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
@@ -65,3 +66,18 @@ def test_a_leader_elsewhere_is_no_body(tmp_path):
     UsdGeom.Xformable(stage.GetPrimAtPath("/Leader")).AddTranslateOp().Set((1, 0, 0))
     stage.GetRootLayer().Save()
     assert read_rigged_hair(modular).rig.character.body is None
+
+
+def test_a_picture_shows_the_leaders_head_as_skin(tmp_path):
+    """As one of a character in one skeleton, wherever its body is held; also skin that no hair can reach."""
+    for name, height in (("head", 1.52), ("shoes", 0.1)):
+        stage = Usd.Stage.Open(str(small_shot(tmp_path / f"{name}.usda")))
+        _ball(stage, "/Who/Skin", "/Who/Rig", (0, height, -0.02))
+        stage.GetRootLayer().Save()
+    modular = _modular(tmp_path / "modular.usda")
+    whole, shoes, parts = (
+        rigged_scene(read_rigged_hair(path)) for path in (tmp_path / "head.usda", tmp_path / "shoes.usda", modular)
+    )
+    assert [scene.mesh_hair[scene.triangles].all(axis=1).sum() for scene in (whole, shoes, parts)] == [3] * 3
+    np.testing.assert_array_equal(parts.mesh_hair[parts.triangles], whole.mesh_hair[whole.triangles])
+    np.testing.assert_allclose(parts.body(7)[parts.triangles], whole.body(7)[whole.triangles], atol=1e-6)
