@@ -125,3 +125,16 @@ def test_a_bone_whirls_as_a_conical_pendulum_does():
     angle = np.arctan2(np.hypot(hung[0], hung[2]), -hung[1])
     assert np.tan(angle) == pytest.approx(spin**2 * (out + length * np.sin(angle)) / 9.81, rel=0.01)
     assert hung[2] == pytest.approx(0.0, abs=1e-3)  # neither ahead of the head nor behind it
+
+
+def test_a_wind_as_strong_as_gravity_pulls_as_gravity_does():
+    """In world axes, on a head that leans and sways."""
+    chains = chain((0, -0.3 * BONE, -BONE))
+    tree, pull = RodTree(chains, RigMaterial(bend=5e-3)), np.tile([0, -9.81, 0], (30, 1))
+    heads = np.tile(np.eye(4), (1, 30, 1, 1))
+    lean = np.outer(0.5 + 0.2 * np.sin(np.arange(30) / 3), [1, 0.5, 0.3])
+    heads[0, :, :3, :3] = Rotation.from_rotvec(lean).as_matrix()
+    weighed, blown = (ChainSolver(chains, tree, 6.0, weight) for weight in (1.0, 0.0))
+    wanted = weighed.simulate(heads, 1 / 30)
+    assert np.abs(wanted[..., 1:]).max() > 0.05
+    np.testing.assert_allclose(blown.simulate(heads, 1 / 30, wind=pull), wanted, atol=1e-6)
