@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.mesh import connected_pieces, vertex_normals
+from neuralocks_core.mesh import vertex_normals, welded_pieces
 from neuralocks_core.preview import shading
 from neuralocks_core.preview.camera import ANGLE, Camera
 from neuralocks_core.preview.canvas import open_canvas
@@ -216,7 +216,7 @@ class Film:
         far = np.linalg.norm(scene.body_rest - scene.centre, axis=1)
         near, farthest = np.percentile(far[scene.mesh_hair], [0, 100])
         light = 0.3 + 0.7 * ((far - near) / max(farthest - near, 1e-6))[:, None].clip(0, 1)
-        piece = connected_pieces(scene.triangles, len(far))
+        piece = welded_pieces(scene.body_rest, scene.triangles[scene.mesh_hair[scene.triangles].all(axis=1)])
         tone = np.exp(np.random.default_rng(5).normal(0, LOCK_TONE, piece.max() + 1))[piece, None]
         return tone * ((1 - light) * np.array(scene.look.root) + light * np.array(scene.look.tip))
 

@@ -153,6 +153,16 @@ def test_a_hair_card_is_drawn_from_both_sides_without_opengl(degrees):
     assert (drawn > 250).all(axis=2).mean() > 0.05
 
 
+def test_a_lock_split_by_a_seam_has_one_tone():
+    lock = CENTRE + 0.1 * np.array([[0, 0, 1.0], [0.1, -1, 1], [-0.1, -1, 1], [0, -2, 1]])
+    points = np.concatenate([lock[[0, 1, 2]], lock[[1, 3, 2]], lock[[0, 1, 2]] * [1, 1, -1]])
+    mesh = {"triangles": np.arange(9).reshape(3, 3), "body_rest": points, "mesh_hair": np.ones(9, bool)}
+    with closing(Film(replace(scene(), **mesh), 44, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
+        first, second, other = film._albedo.reshape(3, 3, 3)
+    np.testing.assert_allclose(first[[1, 2]], second[[0, 2]])
+    assert np.abs(first - other).max() > 0.01 * first.max()
+
+
 def test_a_driver_that_gives_up_half_way_is_let_go(monkeypatch):
     gl_canvas = pytest.importorskip("neuralocks_core.preview.gl_canvas", reason="moderngl is not installed")
 
