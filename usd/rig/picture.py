@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.mesh import connected_pieces
+from neuralocks_core.mesh import welded_pieces
 from neuralocks_core.preview.film import Scene
 from neuralocks_core.rig.parting import parted
 from neuralocks_core.rig.rigging import moving_joints
 from neuralocks_core.rotation import transformed
-from neuralocks_core.skinned_body import Body
 
+from ..shot.whole_body import with_parts
 from .stage import RiggedHair, core_meshes
 
 MOST = 0.3
@@ -25,21 +25,15 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
     Raises:
         NeuralocksError: the skeleton skins no mesh.
     """
-    source = rigged.source
-    character, clip = source.character, source.clip
+    source, character = rigged.source, rigged.source.character
     if character.body is None:
         raise NeuralocksError(
             f"{source.path}: it skins no mesh that is shown, so there is nothing to draw; show it, or bind the hair to it"
         )
-    body = Body.joined([character.body, *rigged.elsewhere])
-    hair = np.arange(len(body.points)) < len(character.body.points)
-    meshes, start = core_meshes(source), 0
-    for mesh, (skin, _) in zip(meshes, parted(character, meshes, moving_joints(character.skeleton, rigged.rig.chains))):
-        hair[start + skin] = False
-        start += len(mesh.points)
-    # In a mesh that is skin and hair, roots of locks ride on the head.
-    piece = connected_pieces(body.triangles, len(body.points))
-    hair |= (np.bincount(piece, hair) / np.bincount(piece) > MOST)[piece]
+    body, clip = with_parts(character.body, rigged.elsewhere), source.clip
+    hair = np.zeros(len(body.points), bool)
+    own = _hair(rigged)
+    hair[: len(own)] = own
     character = replace(character, body=body)
     return Scene(
         times=clip.times,
@@ -57,3 +51,17 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
         size=character.times_human,
         collar=character.collar,
     )
+
+
+def _hair(rigged: RiggedHair) -> np.ndarray:
+    """Which vertices (V,) of the skeleton's own meshes are hair."""
+    meshes, moving = core_meshes(rigged.source), moving_joints(rigged.source.character.skeleton, rigged.rig.chains)
+    result = [np.zeros(0, bool)]
+    for mesh, (skin, _) in zip(meshes, parted(rigged.source.character, meshes, moving)):
+        hair = np.ones(len(mesh.points), bool)
+        hair[skin] = False
+        # In a mesh that is skin and hair, roots of locks ride on the head.
+        piece = welded_pieces(mesh.points, mesh.triangles)
+        share = np.bincount(piece, hair) / np.maximum(np.bincount(piece), 1)
+        result.append(hair | (share > MOST)[piece])
+    return np.concatenate(result)

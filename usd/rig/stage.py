@@ -28,7 +28,7 @@ from ..border.units import Border
 from ..shot.lacking import has_hair_joints, nothing_found
 from ..shot.notes import partial_body
 from ..shot.others import Others
-from ..shot.whole_body import parts_elsewhere
+from ..shot.whole_body import parts_elsewhere, with_parts
 from ..skel.source import find_skeletons, read_rig
 from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins
@@ -49,16 +49,16 @@ class RiggedHair:
         border: its units.
         source: skeleton, body and clip as read.
         rig: hair and body, separated.
-        elsewhere: meshes of the same person that other skeletons skin, on the joints of this one.
         others: other skeletons with hair chains, from which this one was chosen.
+        elsewhere: parts of the character that other skeletons skin, on this one's joints.
     """
 
     stage: Usd.Stage = field(repr=False)
     border: Border
     source: StageRig = field(repr=False)
     rig: HairRig = field(repr=False)
-    elsewhere: tuple[Body, ...] = field(default=(), repr=False)
     others: tuple[str, ...] = ()
+    elsewhere: tuple[Body, ...] = field(default=(), repr=False)
 
     @property
     def path(self) -> str:
@@ -174,9 +174,8 @@ def _on_whole_bodies(found: list[RiggedHair], others: list[StageRig]) -> list[Ri
     for hair, own in zip(found, hairless):
         parts, left = parts_elsewhere(own, [*hairless, *others])
         hair.source.notes.extend(partial_body(own, left))
-        body = own.character.body
-        body = Body.joined([*([] if body is None else [body]), *parts]) if parts else body
-        result.append(replace(hair, rig=hair.rig.with_body(body), elsewhere=tuple(parts)))
+        rig = hair.rig.with_body(with_parts(own.character.body, parts))
+        result.append(replace(hair, rig=rig, elsewhere=tuple(parts)))
     return result
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One person in several skeletons, such as a face, a body and clothes: hair is kept out of the meshes of all of them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -59,8 +59,12 @@ def whole_body(rig: StageRig, rigs: Iterable[StageRig]) -> tuple[Body | None, li
         rigs: all skeletons of the stage.
     """
     parts, left = parts_elsewhere(rig, rigs)
-    own = rig.character.body
-    return (Body.joined([*([] if own is None else [own]), *parts]) if parts else own), left
+    return with_parts(rig.character.body, parts), left
+
+
+def with_parts(own: Body | None, parts: Sequence[Body]) -> Body | None:
+    """A body, or none, followed by parts of it; itself if there are no parts."""
+    return Body.joined([*([] if own is None else [own]), *parts]) if parts else own
 
 
 def parts_elsewhere(rig: StageRig, rigs: Iterable[StageRig]) -> tuple[list[Body], list[str]]:
