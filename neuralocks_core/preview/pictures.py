@@ -30,6 +30,10 @@ CLIP = Detail(4000, 12, 2, 3)
 """A quarter of the strands, wider, with half the vertices: in motion it looks the same, and it draws much faster."""
 
 
+class LacksLibrary(NeuralocksError):
+    """A library that writes such a file is not installed."""
+
+
 def render(
     scene: Scene,
     path: str | os.PathLike,
@@ -59,7 +63,7 @@ def render(
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the extension is unknown, a library is missing, or the file cannot be written.
+        NeuralocksError: the extension is unknown, a library is missing (LacksLibrary), or the file cannot be written.
     """
     path = as_path(path, "path")
     if path.suffix.lower() not in SUFFIXES:
@@ -198,4 +202,4 @@ def _need(module: str) -> None:
 
     if find_spec(module) is None:
         package = {"PIL": "pillow"}.get(module, module.replace("_", "-"))
-        raise NeuralocksError(f'preview: {package} is not installed; pip install "neuralocks[preview]"')
+        raise LacksLibrary(f'preview: {package} is not installed; pip install "neuralocks[preview]"')

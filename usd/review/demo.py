@@ -10,6 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
 from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.flags import flag
+from neuralocks_core.preview.pictures import LacksLibrary
 from neuralocks_core.progress import Progress
 
 from ..baking.bake import bake
@@ -87,7 +88,7 @@ def demo(out, model=None, *, clip: bool = True, progress: Progress | None = None
             continue
         try:
             outputs[name] = timed(name, lambda file=file: preview(baked, out / file, progress=progress))
-        except NeuralocksError as error:
+        except LacksLibrary as error:
             if str(error) not in notes:  # without the extra, both fail for the same reason
                 notes.append(str(error))
     return Demo(shot, result, card, outputs, seconds, notes)

@@ -328,7 +328,7 @@ def test_bad_targets_are_named_before_anything_is_drawn(tmp_path, name, said):
 
 def test_a_missing_writer_is_named_before_anything_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(NeuralocksError, match="imageio-ffmpeg is not installed"):
+    with pytest.raises(preview.LacksLibrary, match="imageio-ffmpeg is not installed"):
         preview.render(never_drawn(), tmp_path / "hair.mp4")
     assert not list(tmp_path.iterdir())
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
 
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import CannotWrite, NeuralocksError
+from neuralocks_core.evaluation.report import Card
 from neuralocks_core.materials import Material
+from neuralocks_core.preview.pictures import LacksLibrary
 from usd.baking.bake import bake
 from usd.baking.simulate import simulate
 from usd.cli.app import main
@@ -189,6 +191,24 @@ def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch, caps
     with pytest.raises(SystemExit):
         main(["demo", "--json"])
     assert json.loads(capsys.readouterr().out)["notes"] == ["of the bake", "of the picture"]
+
+
+def test_the_demo_notes_a_missing_library_and_fails_where_a_picture_cannot_be_written(tmp_path, monkeypatch):
+    """A full disk was a note beside the report card."""
+    import usd.review.demo
+
+    def preview(_baked, path, **_options):
+        raise errors.pop()(f"{path.name}: of the picture")
+
+    for name in ("bake", "read_baked"):
+        monkeypatch.setattr(usd.review.demo, name, lambda *args, **options: None)
+    monkeypatch.setattr(usd.review.demo, "evaluate", lambda *args, **options: Card("", {}, {}, {}))
+    monkeypatch.setattr(usd.review.demo, "preview", preview)
+    errors = [LacksLibrary, LacksLibrary]
+    assert demo(tmp_path).notes == ["demo.png: of the picture", "demo.mp4: of the picture"]
+    errors = [CannotWrite]
+    with pytest.raises(CannotWrite, match=r"demo\.png"):
+        demo(tmp_path)
 
 
 def test_only_what_was_baked_is_measured(tmp_path, model):
