@@ -49,8 +49,8 @@ class Collider:
         self._tree = surface_tree(samples)
 
     def distance(self, points: np.ndarray, limit: float = 0.03, proven: bool = True) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distance [m] (..., ), negative inside, and the unit direction (..., 3) in which it grows fastest; zero on an edge
-        at which two sheets lie on each other, back to back.
+        """Signed distance [m] (..., ), negative inside, and the unit direction (..., 3) in which it grows fastest; zero on the
+        surface where two sheets lie on each other, back to back.
 
         Args:
             points: (..., 3) [m].
@@ -136,10 +136,9 @@ class Collider:
     @cached_property
     def _pseudonormals(self) -> np.ndarray:
         """Unit vectors (F, 7, 3): of the face, of corners 0 1 2, of edges 01 12 20. Zero where sheets lie on each other, back to back:
-        beyond their rim, nothing is inside.
+        beside them and beyond their rim, nothing is inside.
         """
         result = np.empty((len(self.triangles), 7, 3))
-        result[:, 0] = self._normals
         corners = self.points[self.triangles]
         # Files have a vertex once for each side of a seam or of a hard edge, with that side's normal alone.
         triangles = same_vertices(self.points)[self.triangles]
@@ -156,11 +155,14 @@ class Collider:
         result[:, 1:4] = at_corner[triangles]
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
         _, which = np.unique(edges[:, 0] * count + edges[:, 1], return_inverse=True)
+        which = which.reshape(-1, 3)
         at_edge = gather(which.ravel(), np.repeat(self._normals, 3, axis=0), which.max() + 1)
-        result[:, 4:7] = at_edge[which].reshape(-1, 3, 3)
-        size = np.linalg.norm(result[:, 1:], axis=2, keepdims=True)
-        result[:, 1:] = np.where(size > 1e-9, result[:, 1:], 0) / np.maximum(size, 1e-9)
-        return result
+        result[:, 4:7] = at_edge[which]
+        sides = np.sort(which, axis=1)  # two of them tell all three corners
+        _, which = np.unique(sides[:, 0] * len(at_edge) + sides[:, 1], return_inverse=True)
+        result[:, 0] = gather(which.ravel(), self._normals, which.max() + 1)[which.ravel()]
+        size = np.linalg.norm(result, axis=2, keepdims=True)
+        return np.where(size > 1e-9, result, 0) / np.maximum(size, 1e-9)
 
 
 def open_parts(triangles: np.ndarray) -> np.ndarray:

@@ -98,13 +98,17 @@ def test_hard_edges_and_seams_divide_no_surface():
 
 
 def test_a_sheet_with_a_back_encloses_nothing():
-    """Two squares on each other that face away from each other: beside them is air, also where their normals only nearly cancel."""
+    """Two squares on each other that face away from each other: beside them is air, also where their normals only nearly cancel, and
+    before each.
+    """
     square = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]])
     beside = np.array([[0.13, 0.05, -0.01], [0.13, 0.05, 0.01], [-0.02, -0.02, -0.02], [-0.02, -0.02, 0.02]])
+    before = np.array([[0.07, 0.04, 0.03], [0.07, 0.04, -0.03], [0.05, 0.05, 0.03], [0.05, 0.05, -0.03]])
     for turn in [np.eye(3), *from_vector(np.random.default_rng(0).normal(size=(8, 3)))]:
         points = np.concatenate([square, square]) @ turn.T
         sheet = Collider(points, np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]]))
         assert (sheet.distance(beside @ turn.T)[0] > 0.02).all()
+        np.testing.assert_allclose(sheet.distance(before @ turn.T)[0], 0.03, atol=1e-12)
 
 
 def test_what_lies_beyond_an_open_edge_is_known_and_a_seam_is_none():
