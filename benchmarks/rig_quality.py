@@ -17,6 +17,7 @@ import plain_errors  # noqa: F401
 from neuralocks_core import model as model_file
 from neuralocks_core.animation.gestures import KINDS
 from neuralocks_core.animation.random_motion import scripted_clip
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import RigModel, rig_spec
 from neuralocks_core.rig.rods import RigMaterial
@@ -39,11 +40,16 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     rig = read_rigged_hair(options.character, all_shapes=True).rig
-    models = {path.stem: RigModel.load(path) for path in options.models}
+    stems = [path.stem for path in options.models]
+    models = {
+        stem if stems.count(stem) == 1 else str(path): RigModel.load(path) for stem, path in zip(stems, options.models)
+    }
     material = RigMaterial(**next(iter(models.values())).training["material"])
     if options.floor:
         print(f"floor of forgetting: motion error {floor_of_forgetting(rig, material):.3f}")
         return
+    if rig.character.body is None or not len(rig.points):
+        raise NeuralocksError(f"{options.character}: no mesh of its hair can meet a body; give a character with both")
     held = {
         name: static_report(m, rig, material, options.poses, options.seed, optimised=32) for name, m in models.items()
     }

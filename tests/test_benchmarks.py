@@ -13,6 +13,7 @@ from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES
 from neuralocks_core.runtime import StrandModel
+from tests.usd.rig_shots import EXAMPLE, small_shot
 
 
 @pytest.mark.parametrize(
@@ -107,3 +108,31 @@ def test_a_column_that_the_first_case_lacks_is_in_the_table(monkeypatch, capsys)
     heading, _, bob, every = capsys.readouterr().out.strip().splitlines()
     assert heading == "| style | network motion | floor motion |"
     assert bob == "| bob | 0.3 | 0.1 |" and every == "| all | 0.3 | 0.1 |"
+
+
+def test_models_of_one_name_are_compared_under_their_paths(monkeypatch, tmp_path, capsys):
+    """None is measured in another's place; without a body there is nothing to compare."""
+    pytest.importorskip("torch", reason="the extra 'train' is not installed")
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "benchmarks")
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+    rig_quality, still = import_module("rig_quality"), EXAMPLE / "quasi_static.neuralocks"
+    paths = [still, *(tmp_path / folder / "hair.neuralocks" for folder in "ab")]
+    for path in paths[1:]:
+        path.parent.mkdir()
+        path.write_bytes(still.read_bytes())
+    seen = []
+
+    def stop(rig, material, models):
+        seen.extend(models)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rig_quality, "static_report", lambda *_, **__: {})
+    monkeypatch.setattr(rig_quality, "motion_report", stop)
+    monkeypatch.setattr(sys, "argv", ["rig_quality", *map(str, paths)])
+    with pytest.raises(KeyboardInterrupt):
+        rig_quality.main()
+    assert seen == ["quasi_static", *map(str, paths[1:])]
+    bare = small_shot(tmp_path / "bare.usda")
+    monkeypatch.setattr(sys, "argv", [*sys.argv, "--character", str(bare)])
+    with pytest.raises(NeuralocksError, match="bare.usda: no mesh of its hair can meet a body"):
+        rig_quality.main()
