@@ -8,6 +8,7 @@ import numpy as np
 
 from neuralocks_core.body.enclosed import proven_distances
 from neuralocks_core.body.surface_samples import SurfaceSamples, nearest
+from neuralocks_core.character import Character
 from neuralocks_core.reference.chain_contact import BodyMesh
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.skinned_body import Body
@@ -20,7 +21,7 @@ class BodyPatch:
     """The part of the body around the head that hair can reach.
 
     Attributes:
-        body: that part, with blend shapes that leave the head unchanged.
+        body: that part, with the blend shapes of bodies, which leave the head unchanged, without those of the face.
         samples: `count` places on it.
         read: the vertices that `samples` read of it, with its blend shapes.
     """
@@ -30,13 +31,15 @@ class BodyPatch:
     def of(cls, rig: HairRig, count: int) -> "BodyPatch | None":
         """None if there is no body, or hair reaches none of its faces. A training asks several times for that of its rig."""
         near = _in_reach(rig)
-        return None if near is None else cls(near, rig.character.head, count)
+        return None if near is None else cls(near, rig.character, count)
 
-    def __init__(self, near: Body, head: int, count: int):
-        # The hair was fitted to its own head: other bodies vary below it.
-        on_head = np.sum(near.joint_weights * (near.joint_indices == head), axis=1)
+    def __init__(self, near: Body, character: Character, count: int):
+        # The hair was fitted to its own head, with the face on it: other bodies vary below it.
+        on_head = np.sum(near.joint_weights * character.of_head[near.joint_indices], axis=1)
         shapes = {}
-        for name, offsets in near.shapes.items():
+        for (name, offsets), of_body in zip(near.shapes.items(), character.body_shapes):
+            if not of_body:
+                continue
             mean = offsets[on_head > 0.9].mean(axis=0) if (on_head > 0.9).any() else 0.0
             shapes[name] = (offsets - mean) * (1 - on_head)[:, None]
         self.body = replace(near, shapes=shapes)

@@ -296,16 +296,23 @@ def test_hair_does_not_sink_into_a_head_without_a_scalp():
 
 
 def test_other_bodies_vary_below_the_head():
-    """The hair was fitted to the head: what a blend shape does there, and any motion of both, does not vary."""
+    """The hair was fitted to the head: what a blend shape does there, also to a face on joints of its own, and any motion of both
+    does not vary. Those of the face alone are not drawn.
+    """
     rig = with_chest(on_a_ball())
     who, body = rig.character, rig.character.body
     on_head = body.joint_indices[:, 0] == who.head
-    offsets = np.where(on_head[:, None], [0.0, 0.01, 0.0], [0.0, 0.01, 0.05])
-    rig = replace(rig, character=replace(who, body=replace(body, shapes={"wide": offsets})))
+    face = on_head & (body.points[:, 2] > 0.05)
+    joints = np.where(face, len(who.skeleton.names) - 1, body.joint_indices[:, 0])[:, None]
+    shapes = {
+        "wide": np.where(on_head[:, None], [0.0, 0.01, 0.0], [0.0, 0.01, 0.05]),
+        "smile": np.where(face[:, None], [0.0, 0.0, 0.02], 0.0),
+    }
+    rig = replace(rig, character=replace(who, body=replace(body, joint_indices=joints, shapes=shapes)))
     patch = BodyPatch.of(rig, 300)
     still = np.tile(np.eye(4), (len(who.skeleton.names), 1, 1))
     moved = patch.body.posed(still, np.array([1.0])) - patch.body.points
-    below = patch.body.joint_indices[:, 0] != who.head
-    assert below.any() and not below.all()
+    below = ~who.of_head[patch.body.joint_indices[:, 0]]
+    assert below.any() and not below.all() and list(patch.body.shapes) == list(patch.read.shapes) == ["wide"]
     np.testing.assert_allclose(moved[~below], 0, atol=1e-12)
     np.testing.assert_allclose(moved[below], np.tile([0, 0, 0.05], (below.sum(), 1)), atol=1e-12)
