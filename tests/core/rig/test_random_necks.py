@@ -20,11 +20,13 @@ from tests.core.rig.builders import character, tail, with_balls
 
 @pytest.fixture(scope="module", params=[0.0, 2.0], ids=["+Z", "aside"])
 def rig(request) -> HairRig:
-    """A tail on joints of any orient, of a character that faces any way."""
+    """A tail on joints of any orient, of a character that faces any way, with arms that slope."""
     whole = np.eye(4)
     whole[:3, :3] = from_vector(np.array([0, request.param, 0]))
     made = character(tail(), from_vector(np.array([0.3, -1.0, 0.6]))).skeleton
-    who = Character(Skeleton(made.names, made.parents, whole @ made.bind))
+    bind = made.bind.copy()
+    bind[[name.endswith("lower_arm") for name in made.names], 1, 3] -= 0.1
+    who = Character(Skeleton(made.names, made.parents, whole @ bind))
     chains = find_chains(who)
     return HairRig(who, chains, np.zeros((0, 3)), np.zeros((0, 1 + len(chains))), np.zeros((0, 3), int))
 
