@@ -103,15 +103,15 @@ def write_grooms(path, grooms: list[Authored], rig: StageRig | None = None, over
     def author(stage: Usd.Stage) -> None:
         UsdGeom.SetStageUpAxis(stage, border.up_axis if border else UsdGeom.Tokens.y)
         UsdGeom.SetStageMetersPerUnit(stage, border.metres_per_unit if border else 1.0)
-        root = UsdGeom.Xform.Define(stage, _free_path(over.stage if over else stage, Sdf.Path("/"), "Groom"))
+        root = UsdGeom.Xform.Define(stage, _free_path(over.stage if over else stage, Sdf.Path("/"), "Groom", {}))
         if not np.array_equal(place, np.eye(4)):
             root.AddTransformOp().Set(row_matrix(place))
         Usd.ModelAPI(root).SetKind("component")
         stage.SetDefaultPrim(root.GetPrim())
+        numbers: dict[str, int] = {}
         for each in grooms:
-            each.beside.author(
-                author_groom(stage, _free_path(stage, root.GetPath(), each.groom.name), each.groom, each.spline)
-            )
+            free = _free_path(stage, root.GetPath(), each.groom.name, numbers)
+            each.beside.author(author_groom(stage, free, each.groom, each.spline))
 
     path = as_path(path, "path")
     return write_stage(path, author, (lambda layer: over.finish(layer, path)) if over else None)
@@ -161,12 +161,14 @@ def _guessed_uv(groom: Groom) -> np.ndarray:
     return root_uv(roots, centre)
 
 
-def _free_path(stage: Usd.Stage, above: Sdf.Path, name: str) -> Sdf.Path:
-    """An unused path of a prim for a name, which may be a file's without its extension, or a prim path."""
+def _free_path(stage: Usd.Stage, above: Sdf.Path, name: str, numbers: dict[str, int]) -> Sdf.Path:
+    """An unused path of a prim for a name, which may be a file's without its extension, or a prim path. `numbers` holds the last one
+    tried for each name: the next search goes on from there.
+    """
     base = name.rsplit("/", 1)[-1] or "Hair"
     base = Tf.MakeValidIdentifier(f"_{base}" if base[0].isdecimal() else base)  # which would replace a digit
-    path, number = above.AppendChild(base), 1
+    path = above.AppendChild(base)
     while stage.GetPrimAtPath(path):
-        number += 1
-        path = above.AppendChild(f"{base}_{number}")
+        numbers[base] = numbers.get(base, 1) + 1
+        path = above.AppendChild(f"{base}_{numbers[base]}")
     return path

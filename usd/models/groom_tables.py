@@ -71,15 +71,15 @@ def export_grooms(grooms: Sequence[StageGroom], model: StrandModel, put) -> dict
 
 def file_names(paths: list[str]) -> list[str]:
     """A file name for each prim path; they differ in more than case, because some disks ignore case."""
-    names: list[str] = []
+    names: dict[str, str] = {}
+    number: dict[str, int] = {}
     for path in paths:
         stem = name = _short(re.sub(r"\W+", "_", path.strip("/")))
-        number = 1
-        while name.casefold() in {other.casefold() for other in names}:
-            number += 1
-            name = f"{stem}_{number}"
-        names.append(name)
-    return [f"{name}.npz" for name in names]
+        while name.casefold() in names:
+            number[stem] = number.get(stem, 1) + 1
+            name = f"{stem}_{number[stem]}"
+        names[name.casefold()] = name
+    return [f"{name}.npz" for name in names.values()]
 
 
 def _short(stem: str) -> str:

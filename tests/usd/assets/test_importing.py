@@ -15,7 +15,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from tests.core.formats.groom_files import put, tressfx_text
 from tests.shared_data import SHARED
-from usd.assets.groom import write_groom
+from usd.assets.groom import _free_path, write_groom
 from usd.assets.grow import grow
 from usd.assets.importing import import_groom
 from usd.baking.bake import bake
@@ -345,3 +345,20 @@ def test_real_hair_lies_on_another_head_and_bakes(tmp_path, names, model):
     out = bake(tmp_path / "real.usda", tmp_path / "hair.usdc", model, grooms=paths, frames="70").path
     card = evaluate(out, grooms=paths)
     assert all(card.grooms[path]["inside_at_rest_percent"] < 6 for path in paths)  # roots lie on the skin
+
+
+def test_thousands_of_curves_of_one_name_get_names_at_once():
+    """Each began to look for a free number at 2."""
+    taken = set()
+
+    class Stage:
+        asked = 0
+
+        def GetPrimAtPath(self, path):
+            self.asked += 1
+            return path in taken
+
+    stage, numbers = Stage(), {}
+    for _ in range(100):
+        taken.add(_free_path(stage, Sdf.Path("/Groom"), "Hair", numbers))
+    assert len(taken) == 100 and Sdf.Path("/Groom/Hair_100") in taken and stage.asked <= 300
