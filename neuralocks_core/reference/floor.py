@@ -11,6 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.metric_arguments import shaped
 from neuralocks_core.metrics import motion_error, position_error
 from neuralocks_core.progress import Progress
+from neuralocks_core.reference.head_motion import frames_without
 from neuralocks_core.reference.solver import simulate
 from neuralocks_core.whole_numbers import is_whole
 
@@ -42,6 +43,7 @@ def stateless_floor(
     every: int = 10,
     truth: np.ndarray | None = None,
     wind: np.ndarray | None = None,
+    ahead: int = 0,
     progress: Progress | None = None,
     **options: Any,
 ) -> Floor:
@@ -52,7 +54,7 @@ def stateless_floor(
     times that of a simulation.
 
     Args:
-        rest, head, body, triangles, material, wind: as in `simulate`.
+        rest, head, body, triangles, material, wind, ahead: as in `simulate`.
         history: frames of motion that the method may see.
         every: compare every n-th frame, from `history` on.
         truth: (T, S, K, 3) points of `simulate` over the whole clip, if available.
@@ -63,7 +65,7 @@ def stateless_floor(
         NeuralocksError: history or every is no whole number, the clip is not longer than the history, truth is of other frames or
             strands, or the errors of `simulate`.
     """
-    count = len(head)
+    count, options["ahead"] = frames_without(head, ahead), ahead
     if not is_whole(history) or not is_whole(every):
         raise NeuralocksError(f"history {history!r}, every {every!r}: give whole numbers of frames")
     if history < 1 or every < 1 or count <= history + every:
@@ -83,7 +85,8 @@ def stateless_floor(
     for i, frame in enumerate(frames):
         span = slice(frame - history, frame + 1)
         near, blown = (None if each is None else each[span] for each in (body, wind))
-        forgetful[i] = simulate(rest, head[span], near, triangles, material, wind=blown, **options).points[-1]
+        way = head[span.start : span.stop + ahead]
+        forgetful[i] = simulate(rest, way, near, triangles, material, wind=blown, **options).points[-1]
         if progress:
             progress(i + 1, len(frames), "restarting")
     length = np.linalg.norm(np.diff(rest, axis=1), axis=-1).sum(1)

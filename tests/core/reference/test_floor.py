@@ -42,6 +42,13 @@ def test_wind_blows_in_restarts_as_it_does_in_the_clip():
     assert calm.position_percent > 10 * floor.position_percent
 
 
+def test_frames_ahead_shape_the_motion_before_in_restarts_too():
+    """They were compared themselves, or the restarts ended so many frames early."""
+    rest, head = groom(2, curl=0), shaken(34)
+    floor = stateless_floor(rest, head, history=25, every=5, ahead=3, substeps=2)
+    assert floor.frames.tolist() == [25, 30] and floor.rms < 0.2
+
+
 @pytest.mark.parametrize(
     ("changed", "fact"),
     [
