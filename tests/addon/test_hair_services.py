@@ -11,6 +11,7 @@ import trimesh
 from dcc_addon.services import bones, widths
 from dcc_addon.services.history import SampledBoundary
 from dcc_addon.services.live import LiveHair
+from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.motion import Clip
@@ -99,6 +100,25 @@ def test_live_hair_that_follows_another_clip_is_as_if_it_had_followed_no_other()
     np.testing.assert_array_equal(*shown)
 
 
+def test_live_hair_that_follows_another_clip_is_pushed_out_of_skin_that_stood_still_before():
+    """A bump that grows below the strand."""
+    who, ball = character(), trimesh.creation.icosphere(3, 0.1)
+    joints, bump = np.full((len(ball.vertices), 1), who.head), (ball.vertices[:, :1] > 0.09) * [0.02, 0, 0]
+    who = replace(who, body=Body(ball.vertices + [0, 1.68, 0], ball.faces, joints, np.ones(joints.shape), {"bump": bump}))
+    points = np.array([0.07, 1.755, 0]) + np.outer(np.linspace(0, 1, 24), [0.06, -0.15, 0])
+    hair, model = Groom("hair", points.astype(np.float32), np.array([24]), None), StrandModel.load()
+    poses, times, shown = np.tile(who.skeleton.bind, (2, 1, 1, 1)), [0.0, 1.0], []
+    still, growing = (Clip(times, poses, np.array([[0.0], [end]])) for end in (0.0, 1.0))
+    for clips in ((still, growing), (growing,)):
+        live = LiveHair(hair, who, model)
+        for each in clips:
+            live.follow(each)
+            plain, pushed = (live.points(1.0, poses[0], np.eye(4), resolve=on).copy() for on in (False, True))
+        shown.append(pushed)
+    np.testing.assert_array_equal(*shown)
+    assert np.abs(pushed - plain).max() > 0.005
+
+
 def test_a_frame_that_fails_is_not_taken_for_the_one_before(monkeypatch):
     """The same points are given again while nothing changes; not those that were written half."""
     who = character()
@@ -136,6 +156,22 @@ def test_what_the_network_reads_is_that_of_the_pose_and_the_look():
             *own, wind = look
             wanted = sampler.vectors([time], *own, poses[[pose]], wind)[0]
             np.testing.assert_array_equal(kept.vector(time, np.array(own[0]), own[1], poses[pose], wind), wanted)
+
+
+@pytest.mark.parametrize("size", [1.0, 8.0])
+def test_hair_far_from_the_skin_is_beside_its_character_by_the_size_of_that(size):
+    """A giant's wig floats further off than a person's hat."""
+    who, ball = character(), trimesh.creation.icosphere(3, 0.08 * size)
+    bind = who.skeleton.bind.copy()
+    bind[:, :3, 3] *= size
+    joints = np.full((len(ball.vertices), 1), who.head)
+    body = Body(ball.vertices + [0, 1.6 * size, 0], ball.faces, joints, np.ones(joints.shape))
+    who = Character(replace(who.skeleton, bind=bind), body)
+    assert who.times_human == size
+    strand = np.array([0.1, 1.6, 0]) + np.outer(np.linspace(0, 1, 24), [0.05, -0.25, 0])
+    for aside, told in ((0.2, False), (0.4, True)):
+        hair = Groom("hair", (size * (strand + [aside, 0, 0])).astype(np.float32), np.array([24]), None)
+        assert (LiveHair(hair, who, StrandModel.load()).off_skin > 0) == told
 
 
 def test_hair_on_a_head_without_skin_is_not_beside_its_character():
