@@ -164,6 +164,20 @@ def test_a_character_is_measured_at_the_size_shown(size):
     assert shown == pytest.approx(size, rel=1e-3)
 
 
+def test_a_head_that_no_bone_scales_is_exactly_as_large_as_in_the_bind_pose():
+    """However the armature stands, as in the bake: with another rounding in each sampling, the character would be another one, and its
+    hair prepared again.
+    """
+    rng, armature = np.random.default_rng(0), rig.RigArrays("Rig", BONES, PARENTS, rest())
+    _, world = _motion(rng)
+    for turn in rng.normal(size=(20, 3)):
+        place = np.eye(4)
+        place[:3, :3] = 1.3 * from_vector(turn)
+        bind, posed = rig.bind_world(armature, place), place @ world @ np.diag([1 / 1.3, 1 / 1.3, 1 / 1.3, 1])
+        motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, posed, np.zeros((9, 0)), {})
+        assert rig.size_shown(armature, place, motion.world()[:, 3]) == 1.0
+
+
 def test_what_goes_with_the_head_alone_is_on_it():
     """A hat a metre in front of a head that turns; if everything stands still, or moves with the whole figure, nothing is known."""
     still = np.tile(np.eye(4), (5, 1, 1))

@@ -12,8 +12,10 @@ from neuralocks_core import model
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
+from neuralocks_core.rig import rig_spec
 from neuralocks_core.rotation import transformed
 from tests.addon.few_bones import BONES, PARENTS, rest
+from tests.rig_models import random_rig_model
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -170,6 +172,21 @@ def test_hair_bones_have_the_names_that_blender_shows():
         bones.chains_of(arrays, character, "Pony Tail")
     bracketed = rig.RigArrays("Rig", ("spine", "head", "hair[LR]", "hair[LR].1", "hairL"), parents, places)
     assert bracketed.patterns("hair[LR], hair[A-Z]") == ["spine/head/hair_LR_", "spine/head/hairL"]
+
+
+def test_a_bone_model_of_chains_of_another_length_is_refused_by_the_name_of_the_bone():
+    """Its turns would be those of other hair."""
+    names, parents = ("spine", "head", "hair.01", "hair.02", "hair.03"), np.arange(5) - 1
+    places = np.tile(np.eye(4), (5, 1, 1))
+    places[:, 1, 3] = [1.2, 1.6, 1.7, 1.6, 1.5]
+    arrays = rig.RigArrays("Rig", names, parents, places)
+    character = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid())
+    model = random_rig_model(bones.chains_of(arrays, character, "hair.01"), rig_spec())
+    assert bones.LiveBones.of(model, arrays, character).bones == ("hair.01", "hair.02")
+    places[3, 1, 3] = 1.65
+    longer = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid())
+    with pytest.raises(NeuralocksError, match=r"'hair\.01' lies .* train a model for this rig"):
+        bones.LiveBones.of(model, arrays, longer)
 
 
 def test_card_fits_a_sidebar():
