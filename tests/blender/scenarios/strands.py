@@ -141,6 +141,9 @@ def riding(folder: Path) -> None:
     beard.neuralocks_hair.live = False
     bpy.context.view_layer.update()
     assert apart(by_hand, scenes.points(beard)[::24]) < SAME
+    rig.neuralocks_character.head_bone = "neck"
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
+    assert list(session.rigs["Rig"].carriers) == ["Beard"], "the head is no part of the neck"
 
 
 def new_hair(folder: Path) -> None:
