@@ -104,7 +104,9 @@ def test_live_hair_that_follows_another_clip_is_pushed_out_of_skin_that_stood_st
     """A bump that grows below the strand."""
     who, ball = character(), trimesh.creation.icosphere(3, 0.1)
     joints, bump = np.full((len(ball.vertices), 1), who.head), (ball.vertices[:, :1] > 0.09) * [0.02, 0, 0]
-    who = replace(who, body=Body(ball.vertices + [0, 1.68, 0], ball.faces, joints, np.ones(joints.shape), {"bump": bump}))
+    who = replace(
+        who, body=Body(ball.vertices + [0, 1.68, 0], ball.faces, joints, np.ones(joints.shape), {"bump": bump})
+    )
     points = np.array([0.07, 1.755, 0]) + np.outer(np.linspace(0, 1, 24), [0.06, -0.15, 0])
     hair, model = Groom("hair", points.astype(np.float32), np.array([24]), None), StrandModel.load()
     poses, times, shown = np.tile(who.skeleton.bind, (2, 1, 1, 1)), [0.0, 1.0], []

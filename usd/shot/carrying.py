@@ -58,10 +58,8 @@ def followed_joint(rig: StageRig, placement: Placement) -> tuple[int, np.ndarray
 
 def _still(places: np.ndarray) -> bool:
     """Whether transforms (T, 4, 4) to metres are all the same."""
-    size = np.abs(places[:, :3, :3]).max()
-    return bool(
-        np.ptp(places[:, :3, 3], axis=0).max() < STILL and np.ptp(places[:, :3, :3] / size, axis=0).max() < STILL
-    )
+    turned, moved = (np.ptp(places[:, :3, part], axis=0).max() for part in (slice(3), 3))
+    return bool(moved < STILL and turned < STILL * np.abs(places[:, :3, :3]).max())
 
 
 def joint_shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -138,6 +138,18 @@ def test_a_head_that_is_hidden_for_a_frame_is_told(tmp_path, joint, head, code, 
         read_shot(path, head=head)
 
 
+def test_a_joint_below_the_head_that_is_hidden_all_along_is_told_and_nothing_else(tmp_path):
+    path = write_shot(tmp_path, Recipe(bound="mesh"))
+    stage = _with_a_jaw(path)
+    skinned = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/Skin")).GetJointIndicesPrimvar()
+    skinned.Set([len(JOINTS) if joint == HEAD else joint for joint in skinned.Get()])
+    motion = UsdSkel.Animation.Get(stage, "/Hero/Rig/Motion")
+    motion.GetScalesAttr().Set([*motion.GetScalesAttr().Get()[:-1], (0, 0, 0)])
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="jaw' has zero scale"):
+        read_shot(path)
+
+
 def test_each_groom_finds_its_own_character(tmp_path):
     write_shot(tmp_path, Recipe(bound="mesh"), "asset")
     stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
