@@ -45,7 +45,7 @@ _RATE = re.compile(r"train with a smaller --set rate(?: than \S+)?")
 _MEANING = re.compile(r"; check --joint \S+")
 """Remedies that the panel does not have."""
 _REFERENCE = re.compile(r"let the hair start anew there \(--cuts [^)]*\)")
-"""One for which it has another: what is before the scene's range is not sampled."""
+"""One for which it has another: what is before the frame range is not sampled."""
 
 _JOINT = re.compile(r"joint '(?:[^']*/)?([^'/]+)'")
 """A bone as it is written to a file, with all bones above it."""
@@ -55,7 +55,7 @@ def for_the_panel(text: str) -> str:
     """The line of an error or a note, without options and commands of a terminal."""
     for said, shown in WORDS:
         text = text.replace(said, shown)
-    text = _REFERENCE.sub("begin the scene's frame range there", _MEANING.sub("", _CUTS.sub("", text)))
+    text = _REFERENCE.sub("begin the frame range there", _MEANING.sub("", _CUTS.sub("", text)))
     return _JOINT.sub(r"bone '\1'", _RATE.sub("train again", text))
 
 
