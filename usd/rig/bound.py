@@ -17,6 +17,7 @@ from ..border.time_codes import time_codes
 from ..shot.character_notes import lies_down
 from ..shot.notes import not_animated, on_twos, without_turn
 from ..shot.stage import check_frames_named, frame_range
+from ..skel.clip_codes import SAME
 from ..skel.old_copy import outdated_note
 from ..skel.rig_copy import outdated_of
 from .layer import kept_hair
@@ -195,7 +196,7 @@ def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:
     # A frame and a sample at the same time, up to rounding, are one.
     edges = np.array([-np.inf, *own, np.inf])
     after = np.searchsorted(edges, wanted)
-    near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= 1e-6 * hair.border.frame
+    near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= SAME * hair.border.frame
     return sorted({*np.array(wanted)[~near].tolist(), *own})
 
 

@@ -88,13 +88,14 @@ def test_a_joint_that_hangs_from_another_one_is_not_the_models(tmp_path):
         bake_rig(shot, tmp_path / "out.usda", model)
 
 
-def test_a_frame_beside_a_sample_by_rounding_is_that_sample(tmp_path):
+@pytest.mark.parametrize("off", [3e-8, -2e-5])
+def test_a_frame_beside_a_sample_by_rounding_is_that_sample(tmp_path, off):
     """Otherwise there would be two samples whose times no program can tell apart."""
     shot = small_shot(tmp_path / "shot.usda")
     model = model_for(read_rigged_hair(shot))
     stage = Usd.Stage.Open(str(shot))
     rotations = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
-    values = {code + 3e-8: rotations.Get(code) for code in rotations.GetTimeSamples()}
+    values = {code + off: rotations.Get(code) for code in rotations.GetTimeSamples()}
     rotations.Clear()
     for code, value in values.items():
         rotations.Set(value, code)
