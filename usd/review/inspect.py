@@ -16,11 +16,11 @@ from ..border.damage import names_damage
 from ..border.stage_files import OTHERS, USD, open_stage
 from ..border.units import Border
 from ..rig.facing import askew_notes
-from ..rig.notes import RIG_JOINTS, mirrored_notes, offset_notes, weight_notes
+from ..rig.notes import RIG_JOINTS, mirrored_notes, offset_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import check_authored, check_orients, core_meshes, describe_chains, is_baked, of_bake
 from ..rig.uneven import names_uneven_prims
-from ..shot.character_notes import lies_down, untrained, without_body
+from ..shot.character_notes import lies_down, untrained, weight_notes, without_body
 from ..shot.curves import find_curves
 from ..shot.hair_search import HairSearch
 from ..shot.lacking import no_groom, no_skeleton
@@ -98,7 +98,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     bodies = WholeBodies(rigs)
     for rig in rigs:
         stops += without_turn(rig, read)
-        spoils += rig.notes + rig_notes(rig, read) + another_head(rig) + lies_down(rig)
+        spoils += rig.notes + weight_notes(rig) + rig_notes(rig, read) + another_head(rig) + lies_down(rig)
         spoils += partial_body(rig, bodies.of(rig)[1])
         spoils += [] if told else rig.cut_notes()
     moving = [rig for rig in rigs if rig.source.animated]
@@ -160,7 +160,7 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
         reason = str(error).removeprefix("skeleton: ").removeprefix(f"{rig.path}: ")
         spoils.append(f"{rig.path}: would stop a rig bake: {reason}")
         return []
-    spoils += weight_notes(rig) + askew_notes(rig) + outside_notes(rig) + mirrored_notes(rig, chains)
+    spoils += askew_notes(rig) + outside_notes(rig) + mirrored_notes(rig, chains)
     spoils += offset_notes(rig, chains) + left_out_notes(rig, meshes, chains)
     return describe_chains(chains)
 

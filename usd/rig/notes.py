@@ -2,16 +2,14 @@
 """What a user should know about a character with hair on joints: its weights, which joints are found, which chains are taken."""
 
 import numpy as np
-from pxr import UsdSkel
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.rig.carried import moved_between
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import rig_spec
 
-from ..shot.character_notes import lies_down
+from ..shot.character_notes import lies_down, weight_notes
 from ..shot.notes import another_head, unfound, unlikely_head
-from ..skel.binding import rest_primvar
 from ..skel.stage_rig import StageRig
 from .facing import askew_notes
 from .outside import left_out_notes, outside_notes
@@ -36,31 +34,6 @@ def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
 def chain_notes(hair: RiggedHair, patterns: list[str] | None) -> list[str]:
     """What a user should know about automatically chosen chains; those chosen by patterns are the user's own."""
     return [] if patterns else left_out_notes(hair.source, core_meshes(hair.source), hair.rig.chains)
-
-
-def weight_notes(source: StageRig) -> list[str]:
-    """What is wrong with authored weights: reading makes them sum to one, as renderers do."""
-    notes = []
-    for mesh in source.meshes:
-        primvar = UsdSkel.BindingAPI(mesh.prim).GetJointWeightsPrimvar()
-        values = np.asarray(rest_primvar(primvar) if primvar and primvar.HasValue() else [], float)
-        size = max(int(primvar.GetElementSize()), 1) if len(values) else 1
-        if len(values) % size or not len(values):
-            continue
-        path, total = mesh.prim.GetPath(), values.reshape(-1, size).sum(axis=1)
-        free, off = total < 1e-9, np.abs(total - 1) > 0.01
-        if free.any():
-            first = leaf(source.source.names[mesh.indices[int(free.argmax()), 0]])
-            notes.append(
-                f"{path}: {int(free.sum())} of {len(free)} vertices have no weights and are read as bound to the "
-                f"first joint that they name, such as '{first}'; bind them in the rig"
-            )
-        if (off & ~free).any():
-            notes.append(
-                f"{path}: weights of {int((off & ~free).sum())} of {len(off)} vertices do not sum to one "
-                "and are read as if they did; normalise them in the rig"
-            )
-    return notes
 
 
 def mirrored_notes(source: StageRig, chains: HairChains) -> list[str]:

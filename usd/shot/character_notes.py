@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on a character: whether its bind pose stands upright, whether it has a body of a trained size, and whether it is
-scaled evenly.
+"""Notes on a character: whether its bind pose stands upright, whether its skin is bound whole, whether it has a body of a trained
+size, and whether it is scaled evenly.
 """
 
 from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom
+from pxr import Gf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.anatomy.standing import lies
@@ -17,7 +17,7 @@ from neuralocks_core.rotation import transformed
 
 from ..border.arrays import column_matrix
 from ..border.values import as_numbers
-from ..skel.binding import bound_skeleton
+from ..skel.binding import bound_skeleton, rest_primvar
 from ..skel.stage_rig import StageRig
 from ..skel.surface import drawn
 from .notes import unlikely_head
@@ -44,6 +44,31 @@ def lies_down(rig: StageRig) -> list[str]:
     up = rig.border.up_axis
     guess = f"the stage has no upAxis, so {up} is up: author it" if unsaid else f"if it stands, check upAxis ({up})"
     return [f"{rig.path}: lies down in its bind pose, so its hair is taken to hang sideways{foreign or f'; {guess}'}"]
+
+
+def weight_notes(source: StageRig) -> list[str]:
+    """What is wrong with authored weights of a character's skin: reading makes them sum to one, and UsdSkel does not."""
+    notes = []
+    for mesh in source.meshes:
+        primvar = UsdSkel.BindingAPI(mesh.prim).GetJointWeightsPrimvar()
+        values = np.asarray(rest_primvar(primvar) if primvar and primvar.HasValue() else [], float)
+        size = max(int(primvar.GetElementSize()), 1) if len(values) else 1
+        if len(values) % size or not len(values):
+            continue
+        path, total = mesh.prim.GetPath(), values.reshape(-1, size).sum(axis=1)
+        free, off = total < 1e-9, np.abs(total - 1) > 0.01
+        if free.any():
+            first = leaf(source.source.names[mesh.indices[int(free.argmax()), 0]])
+            notes.append(
+                f"{path}: {int(free.sum())} of {len(free)} vertices have no weights and are read as bound to the "
+                f"first joint that they name, such as '{first}'; bind them in the rig"
+            )
+        if (off & ~free).any():
+            notes.append(
+                f"{path}: weights of {int((off & ~free).sum())} of {len(off)} vertices do not sum to one and are read as if they "
+                "did, but UsdSkel shows these vertices elsewhere; normalise them in the rig"
+            )
+    return notes
 
 
 def untrained(rig: StageRig) -> list[str]:

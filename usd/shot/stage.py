@@ -21,7 +21,7 @@ from ..skel.cut_samples import within
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .attach import Attachment, off_head, rig_joint
-from .character_notes import lies_down, untrained, without_body
+from .character_notes import lies_down, untrained, weight_notes, without_body
 from .curve_ends import Beyond, groom_between
 from .curves import find_curves
 from .groom_notes import groom_notes, stands_still
@@ -155,7 +155,7 @@ def read_shot(
     for rig in used:
         if not still:
             _check_animated([rig])
-        notes += rig.notes + lies_down(rig) + partial_body(rig, bodies.of(rig)[1])
+        notes += rig.notes + weight_notes(rig) + lies_down(rig) + partial_body(rig, bodies.of(rig)[1])
     found = [replace(item, attachment=bodies.on(item.attachment)) for item in found]
     notes += without_body(used, every) + _notes_on_motion(found)
     first, last = frame_range(stage, used)

@@ -40,6 +40,19 @@ def test_a_character_that_lies_by_a_stages_silence_is_told(tmp_path, up, lying):
     assert all(note.startswith(LIES) and "no upAxis, so Y is up: author it" in note for note in said)
 
 
+def test_skin_that_usdskel_shows_elsewhere_is_told(tmp_path):
+    """Its weights do not sum to one; bakes of strands were silent."""
+    path = write_shot(tmp_path)
+    assert not _said(path, "do not sum to one")
+    stage = Usd.Stage.Open(str(path))
+    (mesh,) = (prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh))
+    weights = UsdSkel.BindingAPI(mesh).GetJointWeightsPrimvar()
+    weights.Set(0.8 * np.array(weights.Get(), np.float32))
+    stage.Save()
+    (note,) = _said(path, "do not sum to one")
+    assert note.startswith(f"{mesh.GetPath()}: weights of ") and "UsdSkel shows these vertices elsewhere" in note
+
+
 def test_a_character_referenced_with_another_axis_is_told_until_it_is_turned(tmp_path):
     write_shot(tmp_path, Recipe(up="Z"), "asset")
     stage = Usd.Stage.CreateNew(str(tmp_path / "shot.usda"))
