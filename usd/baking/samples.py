@@ -37,6 +37,8 @@ from .write_behind import WriteBehind
 
 BLOCK = 1 << 16
 """Points that are read back and written at a time."""
+TEXT = 3.1
+"""How many times as large samples are as text."""
 
 
 class Poser(Protocol):
@@ -246,7 +248,8 @@ def _check_space(spool: Spool, batched: list, codes: list[float], velocities: bo
         near = 5 * items[0].attachment.rig.border.frame
         waiting = SAVE_EVERY / frame + max(bisect_right(codes, code + near) - place for place, code in enumerate(codes))
         kept = min(waiting, len(codes)) if len(items) == 1 else len(codes)
-        size += 1.03 * frame * ((1 + velocities) * len(codes) + kept)
+        text = TEXT if spool.out.suffix.lower() == ".usda" else 0  # it is made of the finished layer, and beside that
+        size += 1.03 * frame * ((1 + velocities) * (1 + text) * len(codes) + kept)
     if size - left > (free := shutil.disk_usage(spool.folder).free):
         raise CannotWrite(
             f"{spool.out}: needs {math.ceil((size - left) / 1e6)} MB while it is written, {free // 1_000_000} MB are free; "

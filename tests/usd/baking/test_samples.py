@@ -5,6 +5,7 @@ import importlib.util
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -251,6 +252,18 @@ def test_frames_of_a_shot_read_otherwise_are_not_taken_over(tmp_path, model):
                 with pytest.raises(KeyboardInterrupt):
                     make(path, **other, progress=stop)
                 assert (make(read_shot(path, **again)).resumed > 0) == taken
+
+
+def test_a_bake_as_text_asks_for_the_space_of_the_text_too(tmp_path, model, monkeypatch):
+    """It was refused after the last frame."""
+    shot = write_shot(tmp_path, Recipe(frames=10, strands=50, vertices=10))
+    text = bake(shot, tmp_path / "text.usda", model, velocities=False).path.stat().st_size
+    binary = 21 * 50 * 10 * 12  # the points of ten frames twice, and a little
+    for room, refused in ((0.9, pytest.raises(NeuralocksError, match="MB while")), (1.2, nullcontext())):
+        free = int(binary + room * text)
+        monkeypatch.setattr("usd.baking.samples.shutil.disk_usage", lambda _, free=free: SimpleNamespace(free=free))
+        with refused:
+            bake(shot, tmp_path / "out.usda", model, velocities=False)
 
 
 def test_a_bake_that_goes_on_asks_for_the_space_that_it_still_needs(tmp_path, model, monkeypatch):
