@@ -89,8 +89,8 @@ def keys_of_a_library(folder: Path) -> None:
 
 
 def set_in_a_shot(folder: Path) -> None:
-    """What is chosen for an override of a character whose library knows nothing of this add-on lasts when the shot is opened again,
-    when the library is loaded again, and when the override is resynchronised.
+    """What is chosen for an override of a character whose library knows nothing of this add-on lasts when the shot is opened again, also
+    if no view layer shows it, when the library is loaded again, and when the override is resynchronised.
     """
     dcc_addon.unregister()
     scenes.armature()
@@ -104,10 +104,13 @@ def set_in_a_shot(folder: Path) -> None:
     bpy.data.collections["Character"].override_hierarchy_create(
         bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
     )
-    own = _own("ARMATURE").neuralocks_character
-    own.head_bone, own.wind = "head", 3.0
-    rig = _opened_again(folder)
-    assert (rig.neuralocks_character.head_bone, rig.neuralocks_character.wind) == ("head", 3.0)
+    for shown in (False, True):
+        for part in bpy.context.view_layer.layer_collection.children:
+            part.exclude = not shown
+        own = _own("ARMATURE").neuralocks_character
+        own.head_bone, own.wind = "head", 3.0 + shown
+        own = _opened_again(folder).neuralocks_character
+        assert (own.head_bone, own.wind) == ("head", 3.0 + shown), shown
     for reloaded in (False, True) if bpy.app.version >= (4, 0) else ():  # older ones have no such call
         if reloaded:
             bpy.data.libraries[0].reload()
@@ -115,7 +118,7 @@ def set_in_a_shot(folder: Path) -> None:
         root = _own("ARMATURE").override_library.hierarchy_root
         root.override_library.resync(bpy.context.scene, view_layer=bpy.context.view_layer)
         own = _own("ARMATURE").neuralocks_character
-        assert (own.head_bone, own.wind) == ("head", 3.0), reloaded
+        assert (own.head_bone, own.wind) == ("head", 4.0), reloaded
 
 
 def cached_in_a_shot(folder: Path) -> None:
