@@ -8,6 +8,7 @@ import numpy as np
 from neuralocks_core.deformation.resolve import Resolver, reach
 from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
+from neuralocks_core.errors import about
 from neuralocks_core.materials import Material
 from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.strand_set import StrandSet
@@ -61,8 +62,9 @@ class GroomPoser:
                 self._resolvers = [
                     (rows, Resolver(character, begun.subset(rows), self._rig.clip)) for rows in self._alike()
                 ]
-                for _, resolver in self._resolvers:
-                    resolver.prepare()
+                with about(self._rig.path):
+                    for _, resolver in self._resolvers:
+                        resolver.prepare()
 
     @property
     def strands(self) -> StrandSet:

@@ -11,6 +11,7 @@ from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.enclosed import without_air
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.resolve import Resolver, reach
+from neuralocks_core.errors import about
 from neuralocks_core.progress import Progress
 from neuralocks_core.runtime import cores
 from neuralocks_core.strands.strand_set import StrandSet
@@ -47,9 +48,10 @@ def _depths(subjects: list[Subject], say: Progress) -> list[dict]:
     first = subjects[0]
     rig, baked = first.item.attachment.rig, first.baked
     resolver = Resolver(first.character, StrandSet.joined([each.begun for each in subjects]), rig.clip)
-    if resolver.at_rest is None:
-        return [{} for _ in subjects]
-    resolver.prepare()
+    with about(rig.path):
+        if resolver.at_rest is None:
+            return [{} for _ in subjects]
+        resolver.prepare()
     joints, shapes = baked.joints(rig), baked.shapes(rig)
     bind = first.character.skeleton.bind, rig.clip.shape[0]
     at_rest = [_distance(first.character, resolver.at_rest, each.own_rest, *bind) for each in subjects]

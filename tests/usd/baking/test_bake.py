@@ -12,6 +12,7 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.baking.join import join
 from usd.border.stage_files import open_stage
+from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair
@@ -244,6 +245,20 @@ def test_numbers_of_numpy_are_numbers(tmp_path, model):
     for number, strength in enumerate((0.5, np.float32(0.5))):
         files.append(bake(shot, tmp_path / f"{number}.usdc", model, strength=strength, subframes=np.int64(1)).path)
     assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_a_character_whose_body_has_no_surface_is_named(tmp_path, model):
+    """Of several, nobody knew which."""
+    shot = write_shot(tmp_path)
+    stage = Usd.Stage.Open(str(shot))
+    (mesh,) = (UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh))
+    mesh.GetPointsAttr().Set([CENTRE.tolist()] * len(mesh.GetPointsAttr().Get()))
+    stage.Save()
+    with pytest.raises(NeuralocksError, match="^/Hero/Rig: body: its mesh has no triangle with an area"):
+        bake(shot, tmp_path / "out.usdc", model)
+    flat = bake(shot, tmp_path / "out.usdc", model, resolve=False)
+    with pytest.raises(NeuralocksError, match="^/Hero/Rig: body: its mesh has no triangle with an area"):
+        evaluate(flat.path)
 
 
 def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path, still_model):
