@@ -40,12 +40,12 @@ def _of_a_rig(report: Mapping) -> list[str]:
     facts = []
     errors = report.get("motion_error")
     of_springs = [_number(errors, name) for name in errors if "spring" in str(name)] if isinstance(errors, dict) else []
-    error, springs = _number(errors, "dynamic network"), min((e for e in of_springs if e is not None), default=1.0)
-    if error is not None and error >= min(springs, 1.0):
-        facts.append(
-            f"its motion error on motion that it never saw is {error:.2f}, where spring bones have {springs:.2f} and hair "
-            "carried rigidly 1"
-        )
+    error, springs = _number(errors, "dynamic network"), min((e for e in of_springs if e is not None), default=None)
+    if error is not None and error >= min(1.0 if springs is None else springs, 1.0):
+        others = "hair carried rigidly has 1"
+        if springs is not None:
+            others = f"spring bones have {springs:.2f} and hair carried rigidly 1"
+        facts.append(f"its motion error on motion that it never saw is {error:.2f}, where {others}")
     off, rigid = (_number(report, "tip_error_mm", name) for name in ("network", "rigid"))
     if off is not None and rigid is not None and off >= rigid > 0:
         facts.append(

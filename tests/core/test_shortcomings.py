@@ -16,6 +16,7 @@ SPRINGS = {"spring bones, best of 12 settings": 0.78, "spring bones, VRM's defau
     [
         ({"motion_error": {**SPRINGS, "dynamic network": 0.98}}, "is 0.98, where spring bones have 0.78"),
         ({"motion_error": {**SPRINGS, "dynamic network": 0.34}}, None),
+        ({"motion_error": {"dynamic network": 1.2}}, "is 1.20, where hair carried rigidly has 1"),
         (
             {"tip_error_mm": {"network": 29.0, "rigid": 21.0, "optimised": 0.0}},
             "29 mm from where they would hang, .* 21 mm",
