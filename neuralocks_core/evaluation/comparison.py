@@ -13,12 +13,12 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress, silent, within
-from neuralocks_core.rotation import rotation_part
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.smooth_motion import SmoothMotion
 from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
+from neuralocks_core.unscaled import unscaled
 from neuralocks_core.wind import Wind
 
 STEP = 1 / 30
@@ -137,7 +137,7 @@ def _from(
     # One step more than the last time needs, so that interpolation there is the same for any wanted times.
     steps = int(np.ceil((times[-1] - start) / STEP - 1e-9)) + 2
     clock = start + STEP * np.arange(steps + ahead)
-    joints = _unscaled(character, _without_stop(character, clip, clock, times[-1]))
+    joints = unscaled(character, _without_stop(character, clip, clock, times[-1]))
     head, clock, joints = character.canonical_to_world(joints), clock[:steps], joints[:steps]
     shapes = clip.shape_at(clock)
     resolver = Resolver(character, strands, clip)  # for the part of the body that the hair can reach
@@ -203,16 +203,6 @@ def _between(clock: np.ndarray, points: np.ndarray, times: np.ndarray, into: np.
         some = points[:, low : low + TOGETHER].astype(float)
         slopes = np.gradient(some, STEP, axis=0, edge_order=order)
         into[:, low : low + TOGETHER] = CubicHermiteSpline(clock, some, slopes)(times)
-
-
-def _unscaled(character: Character, joints: np.ndarray) -> np.ndarray:
-    """World joint transforms (T, J, 4, 4) as seen by a head that keeps its size: like the network, the solver works on hair at
-    its rest length, whatever size the animation gives the head.
-    """
-    head = character.canonical_to_world(joints)
-    rigid = head.copy()
-    rigid[:, :3, :3] = rotation_part(head, "head")
-    return (rigid @ np.linalg.inv(head))[:, None] @ joints
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:

@@ -25,6 +25,7 @@ from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
+from neuralocks_core.unscaled import unscaled
 
 FINEST = 2.0**-15
 """[m] Displacements are multiples of this step, 0.03 mm, in two bytes; longer hair, which would not fit, has a larger step."""
@@ -141,9 +142,9 @@ class Draw:
 
     def joints(self, character: Character) -> np.ndarray:
         """World joint transforms (T, J, 4, 4) at its times, smooth between the clip's samples as its boundary vectors are: hair that
-        felt a blow at each sample could not be learned from them.
+        felt a blow at each sample could not be learned from them. The head keeps its size.
         """
-        return SmoothMotion(character, self.clip).at(self.times)
+        return unscaled(character, SmoothMotion(character, self.clip).at(self.times))
 
 
 class RolloutMaker:

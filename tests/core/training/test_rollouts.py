@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hair on bodies of other shapes, and which bodies a training has seen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,6 +10,7 @@ import trimesh
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
 from neuralocks_core import rotation
+from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.character import Character
 from neuralocks_core.measures import MEASURES, body_measures
 from neuralocks_core.skinned_body import Body
@@ -53,3 +56,16 @@ def test_a_training_has_seen_the_bodies_between_the_extremes_of_each_shape():
     assert width == pytest.approx(still["head half width"] * (1 + large), rel=1e-6)
     for shape in np.random.default_rng(1).uniform(-SHAPES, SHAPES, (20, 2)):
         assert abs(body_measures(character, shape)[2] - np.mean(front)) < 1.02 * np.ptp(front) / 2
+
+
+@pytest.mark.parametrize("stretch", [[1.2, 1.2, 1.2], [1.25, 0.8, 1.0]])
+def test_hair_learns_from_a_head_that_the_animation_scales_as_from_one_of_constant_size(stretch):
+    """The training ended in an error, or, where the volume stayed, the hair was pushed by a squashed head."""
+    clip = scripted_clip(headed(), "nod", 8.0)
+    joints = clip.joints.copy()
+    joints[80:, HEAD, :3, :3] *= stretch
+    rollouts = [
+        RolloutMaker(TrainingScene(headed(), (straight_hair(),), (each,), frames=60, strands=8)).make(0)
+        for each in (clip, replace(clip, joints=joints))
+    ]
+    assert np.abs(np.diff([each.moved * each.step for each in rollouts], axis=0)).max() < 1e-3
