@@ -39,11 +39,13 @@ def head_motion(head: np.ndarray, substeps: int) -> HeadMotion:
         raise NeuralocksError(f"head: shape {head.shape}; give (frames, 4, 4)")
     if not np.isfinite(head).all():
         raise NeuralocksError("head: holds values that are not finite; check the animation")
-    volume = np.linalg.det(head[:, :3, :3])
-    if np.abs(volume - 1.0).max() > 0.02:
-        frame = int(np.argmax(np.abs(volume - 1.0)))
+    linear = head[:, :3, :3]
+    volume, square = np.linalg.det(linear), np.swapaxes(linear, 1, 2) @ linear
+    off = np.where(volume < 0, np.inf, np.abs(square - np.eye(3)).max(axis=(1, 2)))
+    if off.max() > 0.04:
+        frame = int(np.argmax(off))
         raise NeuralocksError(
-            f"head: frame {frame} scales or mirrors (determinant {volume[frame]:.3g}); remove the scale"
+            f"head: frame {frame} scales, shears or mirrors (determinant {volume[frame]:.3g}); give rotations"
         )
     turns, origin = Rotation.from_matrix(head[:, :3, :3]), head[:, :3, 3]
     frames = len(head)
