@@ -5,6 +5,7 @@ import numpy as np
 from pxr import UsdGeom, UsdSkel, Vt
 
 from usd.baking.bake import bake
+from usd.review.depths import _frames
 from usd.review.evaluate import evaluate
 
 from ..shots import RIG, edited
@@ -54,3 +55,13 @@ def test_hair_that_goes_through_a_cape_is_as_deep_in_it_as_it_is(tmp_path, still
     shot = edited(tmp_path, shoulder_cape)
     bake(shot, tmp_path / "hair.usdc", still_model, resolve=False)
     assert evaluate(tmp_path / "hair.usdc").grooms["/Hero/Hair"]["penetration_worst_mm"] > 20
+
+
+def test_each_groom_is_also_measured_where_it_seems_deepest():
+    rough = np.zeros((200, 2))
+    rough[[50, 120, 121, 140], 0] = -0.01, -0.02, -0.03, -0.04
+    rough[[3, 60, 199], 1] = -0.01, -0.02, -0.03
+    even, (first, second) = _frames(rough)
+    assert len(even) == 32 and even[0] == 0 and even[-1] == 199
+    assert np.array_equal(first[:32], even) and set(first[32:]) == {120, 121, 140} - set(even)
+    assert set(second[32:]) == {3, 60, 199} - set(even) and 3 in second
