@@ -308,6 +308,7 @@ def test_other_bodies_vary_below_the_head():
         "wide": np.where(on_head[:, None], [0.0, 0.01, 0.0], [0.0, 0.01, 0.05]),
         "smile": np.where(face[:, None], [0.0, 0.0, 0.02], 0.0),
     }
+    shapes["wide"][face, 0] = 0.01 * np.sign(body.points[face, 0])
     rig = replace(rig, character=replace(who, body=replace(body, joint_indices=joints, shapes=shapes)))
     patch = BodyPatch.of(rig, 300)
     still = np.tile(np.eye(4), (len(who.skeleton.names), 1, 1))
