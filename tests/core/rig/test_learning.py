@@ -75,6 +75,7 @@ def test_contact_is_cubic_and_linear_beyond_two_centimetres():
     energy.margins[0] = -0.02  # rests 2 cm deep
     assert energy.collision(points[:, :1], normals[:, :1], torch.full((1, 1), 0.03), [0]).item() == 0
     assert energy.collision(points[:, :1], normals[:, :1], torch.full((1, 1), 0.04), [0]).item() > 0
+    assert energy.collision(points[:, :1], normals[:, :1], torch.full((1, 1), 0.03), [2]).item() > 0
 
 
 def test_contact_grows_to_its_full_weight():
