@@ -6,7 +6,6 @@ from contextlib import contextmanager
 import bpy
 
 from ..session import session
-from .animated import animated
 from .shown import enabled
 
 
@@ -35,8 +34,6 @@ def evaluated_for_itself(thing, graph) -> bool:
 
 
 def _needs(thing, layer) -> bool:
-    if "hide_viewport" in animated(thing.animation_data):
-        return True
     return not enabled(thing, layer) and (_moves(thing) or (thing.parent is not None and _needs(thing.parent, layer)))
 
 
