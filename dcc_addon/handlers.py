@@ -17,6 +17,7 @@ from .scene.last_called import go_last, others_called
 from .scene.layers import working_in
 from .scene.lively import lively
 from .scene.locked import lock
+from .scene.lookup import find
 from .scene.overrides import make_comparable
 from .scene.save_as import Remade
 from .scene.together import drawn_with
@@ -111,7 +112,7 @@ def before_save(target=None, *_):
     """Save the hair at rest, so that the file opens right without the add-on, and paths with which it finds its models; Blender
     says since 4.0 where the file will be.
     """
-    blur.end()
+    session.blurred = blur.end()
     model_updates.remember()
     make_comparable(bpy.data.objects)
     as_groomed.keep(bpy.data.objects)
@@ -130,6 +131,9 @@ def after_save(*_):
     named_from.remember(bpy.data.objects, SETTING.values())
     for scene in sorted(bpy.data.scenes, key=lambda scene: scene == bpy.context.scene):
         live.refresh(scene)
+    blurred, session.blurred = session.blurred, []
+    for hair in filter(None, map(find, blurred)):
+        blur.again(hair)
 
 
 @persistent

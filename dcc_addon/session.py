@@ -164,6 +164,8 @@ class Session:
     """Actions that Blender will report as edited, because some of their curves were muted; see `scene.switches`."""
     wanting: bool = False
     """Whether live hair found its motion missing or out of date since this was last handled."""
+    blurred: list[str] = field(default_factory=list)
+    """Hair of a render that goes on after the current save, which takes `scene.blur` off it."""
     remade: Remade | None = None
     """Paths that were rewritten for the current save; see `scene.save_as`."""
     doubtful: set[str] = field(default_factory=set)

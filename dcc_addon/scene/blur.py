@@ -25,8 +25,13 @@ def begin(hair, scene) -> None:
     if hair.library is not None or not curves.has_rest(hair.data) or NAME in hair.modifiers:
         return
     if has_velocities(hair) or not hair.is_deform_modified(scene, "RENDER"):
-        modifier = hair.modifiers.new(NAME, "NODES")
-        modifier.node_group = _without_velocities()
+        again(hair)
+
+
+def again(hair) -> None:
+    """Give hair this modifier back."""
+    modifier = hair.modifiers.new(NAME, "NODES")
+    modifier.node_group = _without_velocities()
 
 
 def has_velocities(hair) -> bool:
@@ -57,14 +62,17 @@ def detach(hair) -> None:
         hair.modifiers.remove(modifier)
 
 
-def end() -> None:
-    """Remove these modifiers again. Their node group stays: if a scene is rendered into a strip of another, the outer render
-    continues, and Blender 5.2 crashes when data that it uses is removed.
+def end() -> list[str]:
+    """Remove these modifiers again, and give the names of the hair that had them. Their node group stays: if a scene is rendered into
+    a strip of another, the outer render continues, and Blender 5.2 crashes when data that it uses is removed.
     """
+    ended = []
     for thing in bpy.data.objects:
         modifier = thing.modifiers.get(NAME) if thing.type == "CURVES" and thing.library is None else None
         if modifier is not None:
             thing.modifiers.remove(modifier)
+            ended.append(thing.name_full)
+    return ended
 
 
 def _without_velocities():
