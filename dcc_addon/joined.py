@@ -22,7 +22,8 @@ def remember(hair, rest: int) -> None:
     """Note where hair stands whose points have just been written; `rest` is the checksum of `curves.points`."""
     written = session.written[hair.name_full]
     # Not read from Blender, which copies the whole of an attribute shared with the evaluated hair before it can be read.
-    session.stood[identity(hair)] = Stood(written.points, written.places[1], written.rest[0], rest)
+    root = written.rest[0].copy()  # not a view, which would keep all of the rest shape of hair that is deleted
+    session.stood[identity(hair)] = Stood(written.points, written.places[1], root, rest)
 
 
 def forget(hair) -> None:

@@ -105,9 +105,9 @@ def show_rest(scene) -> None:
 
 def forget_gone() -> None:
     """Drop messages about objects that were renamed or deleted: another object may get such a name. So is hair that was prepared for
-    one: a large groom holds hundreds of megabytes.
+    one, or written to it: a large groom holds hundreds of megabytes.
     """
-    kept = session.messages, session.misrendered, session.cards, session.hairs
+    kept = session.messages, session.misrendered, session.cards, session.hairs, session.written
     for gone in [name for name in set().union(*kept) if find(name) is None]:
         for each in kept:
             each.pop(gone, None)

@@ -43,7 +43,8 @@ def one_deleted_while_live(folder: Path) -> None:
         for rig in session.rigs.values():
             rig.stale = False
         before = dict(session.rigs)
-        prepared = weakref.ref(session.hairs["Hair of Anna"].hair)
+        kept = [weakref.ref(session.hairs["Hair of Anna"].hair)]
+        kept += [weakref.ref(getattr(session.written["Hair of Anna"], name)) for name in ("rest", "spare")]
         undoing = delete is by_menu and bpy.app.version >= (4, 0)  # without a window, older ones keep no undo steps
         if undoing:
             bpy.ops.ed.undo_push(message="before")
@@ -59,7 +60,8 @@ def one_deleted_while_live(folder: Path) -> None:
         assert session.rigs == before and not session.rigs["Ben"].stale and not session.failed
         if "Hair of Anna" not in bpy.data.objects:
             gc.collect()
-            assert prepared() is None and session.hairs.keys() == {"Hair of Ben"}, delete
+            assert all(each() is None for each in kept), delete
+            assert session.hairs.keys() == session.written.keys() == {"Hair of Ben"}, delete
         scene.neuralocks.armature = bpy.data.objects["Anna"]
         assert not [line for line in panel.drawn("ERROR") if "Hair of" in line]
         scene.neuralocks.armature, scene.neuralocks.hair = bpy.data.objects["Ben"], ben
