@@ -123,7 +123,7 @@ class Session:
     grooms: dict[str, int] = field(default_factory=dict)
     """A number of the rest points of each groom that plays a cache, by the name of its Curves; dropped when these are edited."""
     heads: dict[str, tuple[tuple, str]] = field(default_factory=dict)
-    """The head bone of armatures, by name, and what it was found by; see `scene.as_carried`."""
+    """What the head bone of armatures, by name, was found by, and its name; see `scene.as_carried`."""
     bodies: dict[tuple, tuple] = field(default_factory=dict)
     """Numbers of the bodies of an armature in a scene; dropped when an edit may change them. See `scene.body_known`."""
     surfaces: dict[str, tuple[set[str], int]] = field(default_factory=dict)

@@ -21,7 +21,7 @@ def others(armature, scene) -> dict[str, int]:
     """Numbers of everything else, by what the panels call it; of an armature in a scene, or of none."""
     return {
         "Loop": number_of(armature is not None and armature.neuralocks_character.loop),
-        "Head Bone": number_of(_head(armature) if armature else []),
+        "Head Bone or its rest place": number_of(_head(armature) if armature else []),
         "Unit Scale": number_of(round(scene.unit_settings.scale_length, 9)),
     }
 
@@ -36,17 +36,17 @@ def model(thing, setting: str) -> int | None:
 
 
 def _head(armature) -> list[float]:
-    """Where the bone rests that carries the hair, chosen or found; empty if there is none. It is looked for when bones or the choice change: that
-    takes longer than a redraw may.
+    """Where the bone rests that carries the hair, chosen or found, for a name may be another and the bone the same; empty if there is
+    none. It is looked for when bones or the choice change: that takes longer than a redraw may.
     """
     chosen = armature.neuralocks_character.head_bone
     key, known = (tuple(armature.data.bones.keys()), chosen), session.heads.get(armature.name_full)
     if known is None or known[0] != key:
         try:
             rig = read(armature, chosen)
-            head = armature.data.bones[rig.bones[rig.humanoid()["head"]]]
-            found = [round(value, 5) for value in head.head_local]  # a name may be another and the bone the same
-        except (NeuralocksError, KeyError):
-            found = []
+            found = rig.bones[rig.humanoid()["head"]]
+        except NeuralocksError:
+            found = ""
         known = session.heads[armature.name_full] = key, found
-    return known[1]
+    head = armature.data.bones.get(known[1])
+    return [round(value, 5) for value in head.head_local] if head else []

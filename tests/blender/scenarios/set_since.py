@@ -8,6 +8,7 @@ from unittest import SkipTest
 
 import bpy
 
+from dcc_addon.scene import as_groomed
 from dcc_addon.services.sliders import SLIDERS
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, bones_at, choose, give_bone_model, make_live, needs_usd
@@ -15,7 +16,7 @@ from tests.blender.panel import drawn
 
 
 def character_set_since(folder: Path) -> None:
-    """If the Loop, Head Bone, unit scale or body of attached hair becomes another, a note says so until it is as before, also when the
+    """If the Loop, Head Bone, its rest place, unit scale or body of attached hair becomes another, a note says so until it is as before, also when the
     file is opened again. An older record, which lacks these, tells of nothing but its own parts.
     """
     needs_usd()
@@ -46,9 +47,15 @@ def character_set_since(folder: Path) -> None:
         curve.keyframe_points[1].co.y = 2.0 if deeply else 1.0
         mesh.shape_keys.animation_data.action.update_tag()
 
+    def lower(on: bool) -> None:
+        choose(own.id_data)
+        bpy.ops.object.mode_set(mode="EDIT")
+        own.id_data.data.edit_bones["head"].head.z = 1.54 if on else 1.55
+        bpy.ops.object.mode_set(mode="OBJECT")
+
     changes = {
         "Loop": [lambda on: setattr(own, "loop", on)],
-        "Head Bone": [lambda on: setattr(own, "head_bone", "neck" if on else "")],
+        "Head Bone or its rest place": [lambda on: setattr(own, "head_bone", "neck" if on else ""), lower],
         "Unit Scale": [lambda on: setattr(scene.unit_settings, "scale_length", 0.5 if on else 1.0)],
         "body": [
             lambda on: setattr(body, "hide_render", on),
@@ -57,6 +64,7 @@ def character_set_since(folder: Path) -> None:
             breathe,
         ],
     }
+    assert not as_groomed.changed(strands, scene)  # what it keeps for later drawings, those of the tests lose
     for what, edits in changes.items():
         for edit in edits:
             for on in (True, False):
@@ -165,7 +173,7 @@ def keys_set_since(folder: Path) -> None:
         "Chains": (own, "chains", "hair.01", ""),
         "wind": (own, "wind", 6.0, 0.0),
         "Loop": (own, "loop", True, False),
-        "Head Bone": (own, "head_bone", "neck", ""),
+        "Head Bone or its rest place": (own, "head_bone", "neck", ""),
         "Unit Scale": (scene.unit_settings, "scale_length", 0.5, 1.0),
     }
     for what, (owner, name, other, before) in settings.items():
