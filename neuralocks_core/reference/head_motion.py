@@ -42,7 +42,7 @@ def head_motion(head: np.ndarray, substeps: int) -> HeadMotion:
     linear = head[:, :3, :3]
     volume, square = np.linalg.det(linear), np.swapaxes(linear, 1, 2) @ linear
     off = np.where(volume < 0, np.inf, np.abs(square - np.eye(3)).max(axis=(1, 2)))
-    if off.max() > 0.04:
+    if off.max() > 0.013:  # a scale of 0.65 %
         frame = int(np.argmax(off))
         raise NeuralocksError(
             f"head: frame {frame} scales, shears or mirrors (determinant {volume[frame]:.3g}); give rotations"

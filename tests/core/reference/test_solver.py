@@ -227,6 +227,7 @@ def longer(rest):
         ({"rest": np.zeros((2, 24, 3))}, "without length"),
         ({"rest": np.full((2, 24, 3), np.nan)}, "not finite"),
         ({"head": np.diag([2.0, 2, 2, 1])[None]}, "scale"),
+        ({"head": np.diag([1.01, 1.01, 1.01, 1])[None]}, r"scales, shears or mirrors \(determinant 1\.03\)"),
         ({"head": np.diag([1.25, 0.8, 1, 1])[None]}, r"head: frame 0 scales, shears or mirrors \(determinant 1\)"),
         ({"head": (np.eye(4) + np.eye(4, k=1) * [0, 0.3, 0, 0])[None]}, "shears"),
         ({"head": np.diag([-1.0, 1, 1, 1])[None]}, r"mirrors \(determinant -1\)"),
