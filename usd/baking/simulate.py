@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.deformation.lengths import keep_lengths
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.root_skin import RootSkin
-from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.evaluation.comparison import BLOWN, RUN_IN, simulated
 from neuralocks_core.files import as_path
 from neuralocks_core.flags import flag
@@ -163,7 +163,8 @@ class _SimulatedPoser:
         character = item.attachment.character
         self._skin = RootSkin(character, [every], clip)
         begun = self._skin.begun(every)
-        self._moved = simulated(character, begun.subset(chosen), clip, times, material, wind=wind, **how)
+        with about(self._rig.path):
+            self._moved = simulated(character, begun.subset(chosen), clip, times, material, wind=wind, **how)
         mean = every.rest.mean(axis=1)
         self._chosen = chosen
         self._others = np.setdiff1d(np.arange(len(mean)), chosen)

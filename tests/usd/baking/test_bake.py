@@ -11,6 +11,7 @@ from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.baking.join import join
+from usd.baking.simulate import simulate
 from usd.border.stage_files import open_stage
 from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
@@ -256,6 +257,8 @@ def test_a_character_whose_body_has_no_surface_is_named(tmp_path, model):
     stage.Save()
     with pytest.raises(NeuralocksError, match="^/Hero/Rig: body: its mesh has no triangle with an area"):
         bake(shot, tmp_path / "out.usdc", model)
+    with pytest.raises(NeuralocksError, match="^/Hero/Rig: body: its mesh has no triangle with an area"):
+        simulate(shot, tmp_path / "out.usdc", strands=4)
     flat = bake(shot, tmp_path / "out.usdc", model, resolve=False)
     with pytest.raises(NeuralocksError, match="^/Hero/Rig: body: its mesh has no triangle with an area"):
         evaluate(flat.path)
