@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.mesh import welded_pieces
 from neuralocks_core.preview.film import Scene
 from neuralocks_core.rig.parting import parted
 from neuralocks_core.rig.rigging import moving_joints
@@ -14,9 +13,6 @@ from neuralocks_core.rotation import transformed
 
 from ..shot.whole_body import with_parts
 from .stage import RiggedHair, core_meshes
-
-MOST = 0.3
-"""If at least this share of a connected mesh piece's vertices is hair, all of the piece is."""
 
 
 def rigged_scene(rigged: RiggedHair) -> Scene:
@@ -60,8 +56,5 @@ def _hair(rigged: RiggedHair) -> np.ndarray:
     for mesh, (skin, _) in zip(meshes, parted(rigged.source.character, meshes, moving)):
         hair = np.ones(len(mesh.points), bool)
         hair[skin] = False
-        # In a mesh that is skin and hair, roots of locks ride on the head.
-        piece = welded_pieces(mesh.points, mesh.triangles)
-        share = np.bincount(piece, hair) / np.maximum(np.bincount(piece), 1)
-        result.append(hair | (share > MOST)[piece])
+        result.append(hair)
     return np.concatenate(result)

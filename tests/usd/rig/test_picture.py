@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
+import trimesh
+from pxr import Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.rig.bake import bake_rig
@@ -41,6 +42,28 @@ def test_a_picture_of_mesh_hair(tmp_path):
     panels = [brown[:, i * 124 : i * 124 + 120] for i in range(6)]
     assert all(panel.mean() > 0.02 for panel in panels)
     assert (panels[0] != panels[4]).mean() > 0.02
+
+
+def test_skin_in_one_mesh_with_thick_hair_is_no_hair(tmp_path):
+    """Locks that begin at the skin's vertices make one piece with it, most of which is hair."""
+    ball = trimesh.creation.icosphere(2, 0.1)
+    skin, tops = ball.vertices + [0, 1.52, -0.02], np.flatnonzero(ball.vertices[:, 1] > 0.02)
+    locks = np.concatenate([skin[top] + np.outer(range(4), [0.0, -0.01, -0.03]) for top in tops])
+    first = len(skin) + 4 * np.arange(len(tops))[:, None, None]
+    faces = np.concatenate([ball.faces, (first + [[0, 1, 2], [1, 3, 2]]).reshape(-1, 3)])
+    joints = [*np.where(ball.vertices[:, 1] < -0.06, 0, 1).tolist(), *[1, 2, 3, 4] * len(tops)]
+    path = small_shot(tmp_path / "shot.usda")
+    stage = Usd.Stage.Open(str(path))
+    mesh = UsdGeom.Mesh.Get(stage, "/Who/Hair")
+    mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.concatenate([skin, locks]).astype(np.float32)))
+    mesh.GetFaceVertexCountsAttr().Set([3] * len(faces))
+    mesh.GetFaceVertexIndicesAttr().Set(faces.ravel().tolist())
+    binding = UsdSkel.BindingAPI(mesh.GetPrim())
+    binding.GetJointIndicesPrimvar().Set(joints)
+    binding.GetJointWeightsPrimvar().Set([1.0] * len(joints))
+    stage.GetRootLayer().Save()
+    hair = rigged_scene(read_rigged_hair(path, chains=["hair_0"])).mesh_hair
+    assert not hair[: len(skin)].any() and hair[len(skin) :].all() and hair.mean() > 0.5
 
 
 def test_of_several_characters_one_that_is_baked_is_drawn(tmp_path):
