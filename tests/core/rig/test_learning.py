@@ -139,6 +139,17 @@ def test_a_quasi_static_network_learns_to_hang(quick, monkeypatch):
     assert 0 == off["optimised"] < off["network"] < 0.6 * off["rigid"]
 
 
+def test_a_report_measures_a_few_poses_at_a_time_each_with_its_own_body(monkeypatch):
+    monkeypatch.setattr(rig_report, "OPTIMISED", 2)
+    rig, _ = with_balls()
+    rig = replace(rig, points=rig.points - [0, 0.2, 0])  # in the chest, to which the head turns
+    model, reports = random_model((len(rig.chains),)), []
+    for together in (64, 5):
+        monkeypatch.setattr(rig_report, "TOGETHER", together)
+        reports.append(static_report(model, rig, RigMaterial(), 12, 5, optimised=2))
+    assert reports[0] == reports[1] and reports[0]["penetration_network"]["percent"] > 0
+
+
 def test_errors_are_relative_to_hair_that_is_carried_rigidly():
     rig, rng = branched(), np.random.default_rng(0)
     truth = random_model((len(rig.chains),)).canonical_turns(rng.normal(size=(60, 15))).reshape(2, 30, -1, 4)
