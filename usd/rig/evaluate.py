@@ -9,10 +9,10 @@ from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from neuralocks_core import metrics
 from neuralocks_core.body.enclosed import proven_distances
+from neuralocks_core.body.tree_search import surface_tree
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.mesh import vertex_normals
@@ -171,11 +171,16 @@ class _Posed:
         """How deep in the skin the deepest of points (V, 3) seems to be [m]: beneath the plane of the vertex nearest to it, and
         deeper than at rest.
         """
-        vertices, used = self._skin_at(row), np.unique(self.skin.triangles)
-        nearest = used[cKDTree(vertices[used]).query(points)[1]]
+        vertices = self._skin_at(row)
+        nearest = self._used[surface_tree(vertices[self._used]).query(points)[1]]
         normals = vertex_normals(vertices, self.skin.triangles)[nearest]
         heights = np.einsum("vi,vi->v", points - vertices[nearest], normals)
         return float(np.max(np.minimum(self.from_skin, 0) - heights))
+
+    @cached_property
+    def _used(self) -> np.ndarray:
+        """Vertices (n,) of the skin that some triangle has."""
+        return np.unique(self.skin.triangles)
 
     def _skin_at(self, row: int) -> np.ndarray:
         return self.skin.posed(self._character.skinning(self.clip.joints[row]), self.clip.shape[row])
