@@ -91,8 +91,8 @@ def bake(
     check_number("--strength", strength, 0, 4)
     blown = as_wind(wind, gusts)
     check_felt(blown is None or groom_models.asked.feels_wind)
-    how = {"grooms": grooms, "skeleton": skeleton, "head": head, "joints": joints}
-    shot, codes = read_asked(shot, how, cuts, loop, frames, subframes, blown, progress)
+    reading = {"grooms": grooms, "skeleton": skeleton, "head": head, "joints": joints}
+    shot, codes = read_asked(shot, reading, cuts, loop, frames, subframes, blown, progress)
     options = {"strength": float(strength), "resolve": resolve, "loop": loop}
     models = groom_models.each(shot.grooms)
     digests = {item.path: digest_of(each) for each, items in models for item in items}

@@ -92,8 +92,8 @@ def simulate(
     loop = flag("--loop", loop)
     blown = as_wind(wind, gusts)
     _check_device(device)
-    how = {"grooms": grooms, "skeleton": skeleton, "head": head, "joints": joints}
-    shot, codes = read_asked(shot, how, cuts, loop, frames, subframes, blown, progress)
+    reading = {"grooms": grooms, "skeleton": skeleton, "head": head, "joints": joints}
+    shot, codes = read_asked(shot, reading, cuts, loop, frames, subframes, blown, progress)
     options = {"volume": float(volume), "loop": loop}
     solver = _solver_facts(xpbd, device)
     inputs = {"material": asdict(look), "wind": blown and asdict(blown), "codes": codes, "strands": count}
