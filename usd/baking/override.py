@@ -52,7 +52,8 @@ class OverrideWriter:
         if layer.GetAttributeAtPath(path.AppendProperty("points")):
             return  # done by the bake that this one resumes
         over = over_prim(layer, item.prim)
-        record(over, {**facts, "joint": item.joint, INPUTS: made_from(item.attachment, item.groom)})
+        carried = {"skeleton": item.attachment.rig.path, "joint": item.joint}
+        record(over, {**facts, **carried, INPUTS: made_from(item.attachment, item.groom)})
         if skeleton := bound_skeleton(item.prim):  # perhaps of another character than the one that carries it
             # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
             apply_binding(over, item.prim)

@@ -140,19 +140,23 @@ class Baked:
 def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Baked:
     """Read a bake of any tool: a stage with a skeleton and grooms whose points are sampled over time.
 
-    Arguments are as for `bake`; a joint that the user named as the head is recorded in the bake. If some grooms have samples, those
+    Arguments are as for `bake`; a skeleton, and a joint as the head, that the user named are recorded in the bake. If some grooms have samples, those
     without are left out, with a note.
 
     Raises:
         NeuralocksError: it cannot be read, or no groom has samples.
     """
-    shot = read_shot(path, grooms, skeleton, head, joints, still=True)
+
+    def read(head, cuts=None) -> Shot:
+        return read_shot(path, grooms, skeleton, head, joints, cuts, still=True, as_baked=True)
+
+    shot = read(head)
     if head is None and (head := _named_head(shot)):
-        shot = read_shot(path, grooms, skeleton, head, joints, still=True)
+        shot = read(head)
     told = [(item.attachment.rig.path, recorded_cuts(item.prim)) for item in shot.grooms]
     told = {path: cuts for path, cuts in told if cuts is not None}
     if told:
-        shot = read_shot(path, grooms, skeleton, head, joints, told, still=True)
+        shot = read(head, told)
     sampled = {item.path: UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples() for item in shot.grooms}
     if not any(sampled.values()):
         raise NeuralocksError(

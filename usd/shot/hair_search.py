@@ -20,6 +20,7 @@ from .groom_notes import another_binds, another_carries, far_from_named, no_poin
 from .notes import few
 from .other_curves import drawn_as_copies, other_hair
 from .others import Others
+from .recorded import recorded_skeleton
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 from .seat_notes import coarsely_placed
 from .unusable import Unusable, find_unusable, lies_on
@@ -35,6 +36,7 @@ class HairSearch:
         named: the user named these curves: none is left out because it is empty or far away.
         others: skeletons whose hair is not wanted; None if there are none.
         forced: the user named the skeleton for these curves: a binding to another does not count.
+        as_baked: curves that were baked are carried by the skeleton that carried them then.
 
     Attributes:
         rigs: as given.
@@ -51,8 +53,9 @@ class HairSearch:
         named: bool = False,
         others: Others | None = None,
         forced: bool = False,
+        as_baked: bool = False,
     ):
-        self.rigs, self._head, self._notes = rigs, head, notes
+        self.rigs, self._head, self._notes, self._as_baked = rigs, head, notes, as_baked
         self._named, self._others, self._forced = named, others or None, forced
         self._copied: list[str] = []
         self._far: list[str] = []
@@ -132,25 +135,15 @@ class HairSearch:
             return None
 
     def _attachment(self, prim: Usd.Prim, placement: Placement) -> Attachment | None:
-        path, bound = str(prim.GetPath()), bound_skeleton(prim)
-        if self._others and (why := self._clearly_of_another(prim, bound, placement)):
-            self._of_others.append(why)
-            return None
-        if bound and not self._forced and all(rig.path != bound for rig in self.rigs):
-            # On another's head it would also be skinned by its own skeleton.
-            return self._without(path, bound, bound=True)
-        if not (bound or self._forced) and (own := self._unusable_below(prim, placement)):
-            return self._without(path, own.path, bound=False)
-        if not bound:
-            _ = placement.reference  # before others are read: hair that cannot be placed is nobody's
-            others = self._others.rigs if self._others else []
-            if others and (other := of_another(prim, self.rigs, others, placement, self._head)):
-                self._of_others.append(another_carries(path, other))
+        path, rigs = str(prim.GetPath()), self._baked_with(prim)
+        if not rigs:
+            if self._left_out(prim, placement):
                 return None
+            rigs = self.rigs
         if not self._named and is_lone_guide(prim, self.rigs, placement):
             self._controls.append(path)
             return None
-        found = attach(prim, self.rigs, placement, self._head, self._notes)
+        found = attach(prim, rigs, placement, self._head, self._notes)
         if found.far and not self._named:
             self._far.append(too_far(prim, found))
             return None
@@ -168,6 +161,32 @@ class HairSearch:
         if found.rig not in self.carriers:
             self.carriers.append(found.rig)
         return found
+
+    def _baked_with(self, prim: Usd.Prim) -> list[StageRig]:
+        """The one of `rigs` that carried the curves in their bake, if that is wanted and recorded."""
+        own = recorded_skeleton(prim) if self._as_baked else None
+        return [rig for rig in self.rigs if rig.path == own]
+
+    def _left_out(self, prim: Usd.Prim, placement: Placement) -> bool:
+        """Whether curves are another skeleton's, or of one that cannot be used; tells why."""
+        path, bound = str(prim.GetPath()), bound_skeleton(prim)
+        if self._others and (why := self._clearly_of_another(prim, bound, placement)):
+            self._of_others.append(why)
+            return True
+        if bound and not self._forced and all(rig.path != bound for rig in self.rigs):
+            # On another's head it would also be skinned by its own skeleton.
+            self._without(path, bound, bound=True)
+            return True
+        if not (bound or self._forced) and (own := self._unusable_below(prim, placement)):
+            self._without(path, own.path, bound=False)
+            return True
+        if not bound:
+            _ = placement.reference  # before others are read: hair that cannot be placed is nobody's
+            others = self._others.rigs if self._others else []
+            if others and (other := of_another(prim, self.rigs, others, placement, self._head)):
+                self._of_others.append(another_carries(path, other))
+                return True
+        return False
 
     def _clearly_of_another(self, prim: Usd.Prim, bound: str | None, placement: Placement) -> str:
         """Why curves are not the named skeleton's, if that is clear without reading the others; '' if it is not."""

@@ -85,6 +85,14 @@ def recorded_joint(prim: Usd.Prim) -> str | None:
     return told if isinstance(told, str) else None
 
 
+def recorded_skeleton(prim: Usd.Prim) -> str | None:
+    """Path of the skeleton that carried a groom in its bake; None if it is not recorded, or the bake was made in another stage, where
+    paths are others.
+    """
+    told = recorded(prim).get("skeleton")
+    return told if isinstance(told, str) and in_stage(prim) else None
+
+
 def recorded_volume(prim: Usd.Prim) -> float:
     """The stiffness against strands crowding that a simulation was made with; 0 if none is recorded."""
     told = recorded(prim).get("volume")

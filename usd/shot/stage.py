@@ -106,7 +106,14 @@ class Shot:
 
 @names_damage
 def read_shot(
-    path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None, cuts=None, still: bool = False
+    path,
+    grooms=None,
+    skeleton: str | None = None,
+    head: str | None = None,
+    joints=None,
+    cuts=None,
+    still: bool = False,
+    as_baked: bool = False,
 ) -> Shot:
     """Read a shot for a bake.
 
@@ -119,6 +126,7 @@ def read_shot(
         cuts: time codes at which every character is suddenly elsewhere and its hair starts anew, or a dictionary of them by
             skeleton path; detected if None.
         still: also read the hair of characters without an animation.
+        as_baked: hair that was baked is carried by the skeleton that carried it then, if it is among those wanted.
 
     Raises:
         NeuralocksError: what stops a bake, with the prim and the remedy.
@@ -139,7 +147,13 @@ def read_shot(
     # A named skeleton gets its own hair only: hair that another one carries is left out, unless it is named too.
     others = None if skeleton is None else Others(rigs, stage, head, joints)
     search = HairSearch(
-        rigs, head, notes, named=bool(grooms), others=None if grooms else others, forced=bool(grooms and skeleton)
+        rigs,
+        head,
+        notes,
+        named=bool(grooms),
+        others=None if grooms else others,
+        forced=bool(grooms and skeleton),
+        as_baked=as_baked,
     )
     found = _grooms(search, curves, notes)
     no_hair = search.no_hair()

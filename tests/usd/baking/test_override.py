@@ -14,6 +14,7 @@ from usd.baking.bake import bake
 from usd.baking.header import write_header
 from usd.border.stage_files import used_files
 from usd.border.units import Border
+from usd.review.baked import read_baked
 from usd.shot.stage import read_shot
 from usd.skel.binding import bound_skeleton
 
@@ -148,6 +149,10 @@ def test_hair_that_another_character_carries_than_it_is_bound_to_is_not_skinned_
     assert [str(target.GetPrim().GetPath()) for target in binding.GetSkinningTargets()] == ["/ann/Skin"]
     (again,) = read_shot(out, **given).grooms
     assert again.attachment.rig.path == "/bob/Rig" and bound_skeleton(again.prim) == "/ann/Rig"
+    for asked in ({}, {"skeleton": "/bob/Rig"}, given):  # a report measures it on the head that carries it
+        baked = read_baked(out, **asked)
+        assert {item.path: item.attachment.rig.path for item in baked.shot.grooms} == {"/ann/Hair": "/bob/Rig"}
+        assert not any("bake again" in note for note in baked.shot.notes)
 
 
 @pytest.mark.parametrize("bound", ["mesh", "none"])
