@@ -140,8 +140,8 @@ class Baked:
 def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None = None, joints=None) -> Baked:
     """Read a bake of any tool: a stage with a skeleton and grooms whose points are sampled over time.
 
-    Arguments are as for `bake`; a skeleton, and a joint as the head, that the user named are recorded in the bake. If some grooms have samples, those
-    without are left out, with a note.
+    Arguments are as for `bake`, which records the skeleton and the joint that carry hair: no user need name them again. If some
+    grooms have samples, those without are left out, with a note.
 
     Raises:
         NeuralocksError: it cannot be read, or no groom has samples.

@@ -107,7 +107,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
     elif rigs and not any("wind" in recorded(prim) for prim in curves):
         stops.append(not_animated(rigs[0]))
-    search = HairSearch(rigs, head, spoils)
+    search = HairSearch(rigs, head, spoils, as_baked=True)
     grooms = facts_of_grooms(search, curves, bodies, border, spoils, stops)
     spoils += [note for each in map(bodies.on, search.on_heads) for note in untrained(each.carrying)]
     spoils += search.off_heads() + without_body(search.carriers, rigs)

@@ -15,6 +15,7 @@ from usd.baking.header import write_header
 from usd.border.stage_files import used_files
 from usd.border.units import Border
 from usd.review.baked import read_baked
+from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 from usd.skel.binding import bound_skeleton
 
@@ -139,7 +140,8 @@ def test_the_extent_holds_the_width_of_hair_in_the_unit_of_its_points(tmp_path, 
 
 def test_hair_that_another_character_carries_than_it_is_bound_to_is_not_skinned_by_its_own(tmp_path, still_model):
     layer = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, Recipe(nesting="/ann"))))
-    Sdf.CopySpec(Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, Recipe(nesting="/bob"), "bob"))), "/bob", layer, "/bob")
+    bob = Sdf.Layer.FindOrOpen(str(write_shot(tmp_path, Recipe(nesting="/bob", frames=5), "bob")))
+    Sdf.CopySpec(bob, "/bob", layer, "/bob")
     layer.Save()
     given = {"grooms": ["/ann/Hair"], "skeleton": "/bob/Rig"}
     out = bake(layer.realPath, tmp_path / "hair.usdc", still_model, **given).path
@@ -153,6 +155,7 @@ def test_hair_that_another_character_carries_than_it_is_bound_to_is_not_skinned_
         baked = read_baked(out, **asked)
         assert {item.path: item.attachment.rig.path for item in baked.shot.grooms} == {"/ann/Hair": "/bob/Rig"}
         assert not any("bake again" in note for note in baked.shot.notes)
+    assert not any("bake again" in line for line in inspect(out)["spoils"])
 
 
 @pytest.mark.parametrize("bound", ["mesh", "none"])
