@@ -9,7 +9,6 @@ import pytest
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import find_chains
-from neuralocks_core.rig.hair_names import says_face, says_hair, says_hair_alone
 from neuralocks_core.rig.measuring import placed_chains
 from neuralocks_core.rotation import from_vector
 from tests.core.rig.builders import character, skin, tail
@@ -31,64 +30,6 @@ def test_strange_names_are_found_by_what_they_drive():
     body = skin(who, {"hips": np.eye(3), "head": np.eye(3) + 1, "cable_1": np.eye(3)})
     jaw = skin(who, {"jaw_1": np.eye(3)})
     assert find_chains(who, [lock, body, jaw]).names == ("J_opt_C_01_1",)
-
-
-def test_an_end_joint_may_have_an_end_of_its_own():
-    """FBX exporters add leaf bones to whatever is last: the bone still ends at the rig's own end joint."""
-    who = character(tail("hair", 4))
-    mesh = skin(who, {"hair_1": np.eye(3) * 0.1 + [0, 1.6, -0.1], "hair_2": np.eye(3) * 0.1 + [0, 1.5, -0.1]})
-    chains = find_chains(who, [mesh])
-    assert chains.names == ("hair_1", "hair_2")
-    assert chains.chain_length(0) == pytest.approx(2 * np.hypot(0.06, 0.01))
-    assert len(find_chains(who)) == 3  # without skin, nothing shows it
-
-
-def test_what_names_of_many_conventions_say():
-    """VRoid, Unity, Unreal, 3ds Max, MikuMikuDance, and artists' names for hair, faces and things worn."""
-    hair = "J_Sec_Hair1_01 J_L_HairFront_00_SJ hair_01_l Bip001_HairA01 bangs_C_1 PonyTail_L SideLock_R maegami_01 tail_L_01 wig_01 "
-    hair += "HairBun_L 前髪_01 左もみあげ 三つ編み1 横毛2 头发01"
-    other = "leftEye eye_L brow_tail ear_tuft EarRing_L_02 CatEar_R nekomimi HairRibbon_L hair_clip_L HeadBand Sunglasses horn_L "
-    other += "mustache_L bangle_1 BunnyEar_L wiggle_2 両目 まつ毛 舌1 髪飾り左 髪リボン1 メガネ 猫耳_L "
-    other += "Mimi_L Kemonomimi_R ケモミミ_L うさみみ catear_L leftear Antler.L HairRope_L HairRing_L HairAcc_L HairFeather 髪ゴム "
-    other += "FACIAL_C_Hair1 FACIAL_L_12IPV_Hair1 FACIAL_R_HairA3 FACIAL_L_Sideburn2"  # MetaHuman's scalp and temples
-    assert [name for name in hair.split() if not says_hair(name)] == []
-    assert [name for name in other.split() if says_hair(name)] == []
-    assert [name for name in other.split() if not says_face(name)] == ["bangle_1", "wiggle_2"]
-
-
-def test_hair_is_not_worn_because_its_name_begins_like_a_pin():
-    hair = "hair_tied_l_1 hair_pinned_R hair_tier1_2 hair_feathered_l hair_clipped_1 hair_pin_curl_L hair_ringlet_2 hair_bowl"
-    worn = "hair_pin_L hairpin_l_1 HairPinL hair_tie.001 HairClips_01 hair_band hairBow_R HAIRPIN hair_acc_2 HairAccessory_L"
-    assert [name for name in hair.split() if not says_hair(name)] == []
-    assert [name for name in worn.split() if says_hair(name) or not says_face(name)] == []
-
-
-def test_features_may_curl_and_lock():
-    """The bake would overwrite their animation; but there is hair beside ears and on foreheads."""
-    features = "lip_curl_1 tongue_curl_L_2 brow_lock_1 eyeLock_R lash_curl_L"
-    assert [name for name in features.split() if says_hair(name) or not says_face(name)] == []
-    hair = "curl_1 lock_L_2 ear_lock_L forehead_curl pin_curl_1 brown_curl_1 eye_bangs_L"
-    assert [name for name in hair.split() if not says_hair(name)] == []
-
-
-def test_hair_in_chinese_and_in_the_words_of_animation():
-    """发 at a word's end is hair; it also begins other words."""
-    hair = "前发_左_1 后发1 侧发_R 鬓发 长发_1 卷发_左_1 发_02 アホゲ_1 触角_左 ちょんまげ 앞머리1 뒷머리"
-    other = "发光 发射_1 发带 发夹_L 发簪 머리 머리끝"
-    assert [name for name in hair.split() if not says_hair(name)] == []
-    assert [name for name in other.split() if says_hair(name)] == []
-
-
-def test_a_chair_is_no_hair():
-    assert not any(map(says_hair, "wheelchair chair_01 Armchair prop_chair".split()))
-    assert all(map(says_hair, "C_Hair CHair_1 bang_c_hair J_C_HAIR BackHair".split()))
-
-
-def test_what_says_hair_wherever_it_hangs():
-    """Coats have tails, fringes and strands; fingers curl, and rigs have locators."""
-    assert all(map(says_hair_alone, "hair0_0 J_Sec_Hair1_01 PonyTail_L 左髪_1 braid_02 Mane_01".split()))
-    other = "coat_tail_01 jacket_fringe_L strand_2 index_curl_L lock_01 bundle_3 HairPin_L scarf_01"
-    assert [name for name in other.split() if says_hair_alone(name)] == []
 
 
 @pytest.mark.parametrize("name", ["hair_group", "head_twist"])
@@ -153,21 +94,6 @@ def test_twist_joints_ride_on_the_bone_that_they_lie_on(share):
     assert find_chains(who, [skin(who, skins)]).names == ("hair_1", "hair_2", "hair_3", "hair_side")
 
 
-@pytest.mark.parametrize("aside", [(0, 0, 0), (0, 0, -0.3), (0.1, 0, 0)])
-@pytest.mark.parametrize("what", ["socket", "pin"])
-def test_sockets_and_pins_on_a_chain_are_none_of_its_bones(what, aside):
-    """A joint without skin beside one with skin is no bone's end, and what is worn in hair rides on it."""
-    at = np.add((0, 1.54, -0.11), aside)
-    name = {"socket": "weapon_socket", "pin": "HairPin_L"}[what]
-    who = character([*tail("hair", 4), (name, "hair_2", tuple(at)), (f"{name}_end", name, tuple(at + [0, 0, 0.05]))])
-    skins = {f"hair_{i}": np.eye(3) * 0.02 + [0, 1.66 - 0.06 * i, -0.09 - 0.01 * i] for i in (1, 2, 3)}
-    if what == "pin":
-        skins[name] = np.eye(3) * 0.02 + at
-    chains = find_chains(who, [skin(who, skins)])
-    assert chains.names == ("hair_1", "hair_2", "hair_3")
-    np.testing.assert_allclose(np.linalg.norm(chains.bones, axis=1), np.hypot(0.06, 0.01), rtol=1e-6)
-
-
 @pytest.mark.parametrize("tie", ["hair_tie", "HairBand_L", "ribbon_1", "flower"])
 @pytest.mark.parametrize("patterns", [None, ["pony_1"]])
 def test_hair_goes_on_from_what_ties_it(tie, patterns):
@@ -203,46 +129,12 @@ def test_a_tail_of_one_joint_goes_on_from_its_tie(tie_has_skin):
     assert chains.names == ("hair_1", "hair_tie", "hair_3")
 
 
-def test_an_end_that_curls_back_is_still_the_end():
-    rows = [*tail("hair", 2), ("hair_2_end", "hair_2", (0.02, 1.56, -0.14)), ("socket", "hair_2", (0.0, 1.5, -0.115))]
-    who = character(rows)
-    skins = {"hair_1": np.eye(3) * 0.05 + [0, 1.5, -0.1], "hair_2": np.eye(3) * 0.01 + [0.02, 1.56, -0.14]}
-    np.testing.assert_allclose(find_chains(who, [skin(who, skins)]).bones[1], (0.02, 0.02, -0.03), atol=1e-9)
-
-
 def test_a_pin_that_is_named_is_hair():
     pin = [("HairPin_L", "hair_1", (0.05, 1.5, -0.1)), ("HairPin_end", "HairPin_L", (0.05, 1.45, -0.1))]
     who = character([*tail("hair", 3), *pin])
     skins = {name: np.eye(3) * 0.05 + [0, 1.55, -0.1] for name in ("hair_1", "hair_2", "HairPin_L")}
     for patterns, own in ((None, False), (["hair_1"], False), (["hair_1", "HairPin*"], True)):
         assert ("HairPin_L" in find_chains(who, [skin(who, skins)], patterns).names) == own
-
-
-def test_a_strand_that_begins_at_a_joint_of_hair_is_refused_rather_than_left_still():
-    rows = tail("hair", 4)
-    at = rows[1][2]
-    who = character([*rows, ("hair_b", "hair_2", at), ("hair_b_end", "hair_b", tuple(np.add(at, (0.05, -0.05, 0))))])
-    skins = {name: np.eye(3) * 0.05 + [0, 1.5, -0.1] for name in ("hair_1", "hair_2", "hair_3", "hair_b")}
-    with pytest.raises(NeuralocksError, match="no length"):
-        find_chains(who, [skin(who, skins)])
-
-
-def test_of_two_ends_the_one_ahead_is_the_bones():
-    rows = [*tail("hair", 3), ("socket", "hair_2", (0.45, 1.54, -0.1))]
-    who = character(rows)
-    skins = {name: np.eye(3) * 0.05 + [0, 1.5, -0.1] for name in ("hair_1", "hair_2")}
-    np.testing.assert_allclose(
-        np.linalg.norm(find_chains(who, [skin(who, skins)]).bones, axis=1), np.hypot(0.06, 0.01), rtol=1e-6
-    )
-
-
-def test_a_bone_without_length_is_told_with_the_joint_at_its_place():
-    rows = tail("hair", 4)
-    who = character([*rows, ("hair_b", "hair_2", rows[1][2]), ("hair_c", "hair_b", tuple(np.add(rows[1][2], 0.05)))])
-    points = np.eye(3) * 0.02
-    names = ("hair_1", "hair_2", "hair_3", "hair_b", "hair_c")
-    with pytest.raises(NeuralocksError, match="'hair_2' has no length \\('hair_b' lies at the same place"):
-        find_chains(who, [skin(who, dict.fromkeys(names, points))])
 
 
 @pytest.mark.parametrize("leaf_bones", [False, True])
@@ -394,37 +286,6 @@ def test_a_branching_chain_is_one_chain():
     assert (chains.bone_joint == chains.names.index("hair_2")).sum() == 2
 
 
-def test_a_last_joint_with_skin_moves():
-    """Its bone reaches as far as the skin that it drives."""
-    who = character(tail("hair", 2, step=(0, -0.06, 0)))
-    mesh = skin(who, {"hair_1": [[0, 1.6, -0.1]] * 3, "hair_2": [[0, 1.54, -0.1], [0, 1.5, -0.1], [0, 1.44, -0.1]]})
-    chains = find_chains(who, [mesh])
-    assert chains.names == ("hair_1", "hair_2")
-    np.testing.assert_allclose(chains.bones[1], [0, -0.10, 0], atol=1e-12)
-
-
-@pytest.mark.parametrize(("beyond", "moves"), [(0.008, False), (0.03, True)])
-def test_a_last_joint_that_its_skin_hardly_passes_is_the_end_of_the_bone_before(beyond, moves):
-    who = character(tail("hair", 3))
-    places = {name: who.skeleton.bind[list(who.skeleton.names).index(name), :3, 3] for name in who.skeleton.names}
-    ends = {name.rsplit("/", 1)[-1]: place for name, place in places.items() if "hair" in name}
-    along = np.array([0, -0.06, -0.01]) / np.hypot(0.06, 0.01)
-    sheets = {name: [place + along * (0.05 if name != "hair_3" else beyond)] * 3 for name, place in ends.items()}
-    assert find_chains(who, [skin(who, sheets)]).names == ("hair_1", "hair_2", "hair_3")[: 3 if moves else 2]
-
-
-def test_skin_that_a_last_joint_hardly_moves_does_not_lengthen_its_bone():
-    who = character(tail("hair", 2, step=(0, -0.06, 0)))
-    mesh = skin(who, {"hair_1": [[0, 1.6, -0.1]] * 2 + [[0, 1.3, -0.1]], "hair_2": [[0, 1.44, -0.1]] * 3})
-    share = np.where(np.arange(6) == 2, 0.1, 0.0)[:, None]
-    mesh = replace(
-        mesh,
-        joint_indices=np.hstack([mesh.joint_indices, np.full((6, 1), mesh.joint_indices[-1, 0])]),
-        joint_weights=np.hstack([mesh.joint_weights - share, share]),
-    )
-    np.testing.assert_allclose(find_chains(who, [mesh]).bones[1], [0, -0.10, 0], atol=1e-12)
-
-
 def test_joint_orients_and_facing_cancel():
     """The same rig with turned joints and a turned body has the same chains in canonical space."""
     plain = find_chains(character(tail("hair", 3)))
@@ -435,24 +296,3 @@ def test_joint_orients_and_facing_cancel():
     other = find_chains(moved)
     np.testing.assert_allclose(other.origins, plain.origins, atol=1e-9)
     np.testing.assert_allclose(other.bones, plain.bones, atol=1e-9)
-
-
-@pytest.mark.parametrize("place", [(0.05, 1.54, -0.11), (0, 1.54, -0.11)], ids=["aside", "on its joint"])
-def test_an_end_marker_off_the_hair_is_not_believed(place):
-    """Exporters add "leaf bones" where a bone's axis points; the skin tells where the hair ends."""
-    who = character([*tail("hair", 2), ("hair_2_end", "hair_2", place)])
-    along, ends = np.array([0, -0.06, -0.01]), np.array([[0.2], [0.6], [1.2]])
-    sheets = {f"hair_{i + 1}": [0, 1.6, -0.1] + along * (i + ends) for i in range(2)}
-    chains = find_chains(who, [skin(who, sheets)])
-    assert chains.names == ("hair_1", "hair_2")
-    np.testing.assert_allclose(chains.bones, [along, 1.2 * along], atol=1e-12)
-
-
-@pytest.mark.parametrize("down", [[0, 0, 0], [-0.06, -0.05, 0]], ids=["all of it", "some of it"])
-def test_an_end_marker_of_hair_that_turns_is_believed(down):
-    """The skin goes with it, or a part of the skin."""
-    aside, tip = np.array([0.05, 0, 0]), np.array([0, 1.54, -0.11])
-    who = character([*tail("hair", 2), ("hair_2_end", "hair_2", tuple(tip + aside))])
-    along = np.array([[0.1], [0.1 if any(down) else 0.5], [0.9]])
-    mesh = skin(who, {"hair_1": [[0, 1.57, -0.105]] * 3, "hair_2": tip + aside * along + np.outer(down, [0, 1, 0])})
-    np.testing.assert_allclose(find_chains(who, [mesh]).bones[1], aside, atol=1e-12)
