@@ -9,6 +9,19 @@ import pytest
 
 FLAGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-pedantic"]
 COMPILERS = [("gcc", "c", "c99"), ("g++", "c++", "c++11"), ("clang", "c", "c99"), ("clang++", "c++", "c++11")]
+INPUT_HARNESS = """#include "hair.h"
+#include <stdio.h>
+int main(void) {
+  static nl_hair_input in;
+  static float x[NL_HAIR_FEATURES];
+  while (fread(&in, sizeof in, 1, stdin) == 1) {
+    nl_hair_features(&in, x);
+    fwrite(x, sizeof x, 1, stdout);
+  }
+  return 0;
+}
+"""
+"""Gives the features of each input."""
 HISTORY_HARNESS = """#include "hair.h"
 #include <stdio.h>
 int main(void) {
