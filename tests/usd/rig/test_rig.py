@@ -64,7 +64,7 @@ def test_a_channel_keeps_both_its_samples_and_what_it_shows_at_no_time(tmp_path)
 
 
 def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_so(tmp_path):
-    """As for strands, see test_bake.py."""
+    """As for strands, see test_bake_tells.py."""
     for name in ("show", "layout", "cache"):
         (tmp_path / name).mkdir()
     model = model_for(read_rigged_hair(small_shot(tmp_path / "show" / "who.usda")))
