@@ -1,28 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report card, the preview and the demo on bakes whose answers are known."""
+"""The report card of bakes whose answers are known."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
 
-from neuralocks_core.errors import CannotWrite, NeuralocksError
-from neuralocks_core.evaluation.report import Card
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
-from neuralocks_core.preview.pictures import LacksLibrary
 from usd.baking.bake import bake
-from usd.baking.simulate import simulate
 from usd.cli.app import main
-from usd.review import subject
 from usd.review.baked import read_baked
-from usd.review.demo import demo, shipped_shot
+from usd.review.demo import shipped_shot
 from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
 from usd.shot.recorded import record, recorded
 
-from ..shots import Recipe, strand_points, write_loop, write_shot
+from ..shots import Recipe, write_shot
 
 FRAMES = "1:60:12"
 
@@ -84,68 +79,6 @@ def test_the_command_draws_the_curves_of_the_card(rigid, tmp_path, capsys):
     assert (tmp_path / "tips.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_part_of_a_shot_is_compared_with_hair_that_knows_what_came_before(tmp_path, model):
-    """The network reads the motion before the first frame baked; a reference at rest there would be another shot's."""
-    pytest.importorskip("warp", reason="the extra 'train' is not installed")
-    shot, tips = write_shot(tmp_path, Recipe(frames=24, strands=8)), []
-    for frames in ("1:24", "13:24"):
-        bake(shot, tmp_path / "hair.usdc", model, frames=frames, velocities=False)
-        tips.append(evaluate(tmp_path / "hair.usdc", reference=True).curves["/Hero/Hair"]["reference"])
-    assert np.linalg.norm(tips[1][0]) > 0.005
-    np.testing.assert_allclose(tips[1], tips[0][12:], atol=1e-5)
-
-
-def test_a_loop_is_compared_with_a_loop(tmp_path, model):
-    """Otherwise the reference begins at rest where the bake remembers the end, and takes the loop's seam as a stop."""
-    pytest.importorskip("warp", reason="the extra 'train' is not installed")
-    shot, off = write_loop(tmp_path), {}
-    for loop in (False, True):
-        bake(shot, tmp_path / "hair.usdc", model, loop=loop, velocities=False)
-        tips = evaluate(tmp_path / "hair.usdc", reference=True).curves["/Hero/Hair"]["reference"]
-        off[loop] = np.linalg.norm(tips[0] - tips[-1])
-    assert off[True] < 5e-4 < 5e-3 < off[False]
-
-
-def test_a_simulation_is_compared_with_the_solver_as_it_was(tmp_path, monkeypatch):
-    """The solver keeps strands apart if the bake records that."""
-    pytest.importorskip("warp", reason="the extra 'train' is not installed")
-    shot = write_shot(tmp_path, Recipe(frames=24, vertices=24))
-    for volume in (0.0, 3.0):
-        simulate(shot, tmp_path / "hair.usdc", volume=volume)
-        card = evaluate(tmp_path / "hair.usdc", reference=True)
-        rows = card.compared["/Hero/Hair"]
-        assert rows["bake"]["motion_error_median"] < 0.004 and rows["bake"]["position_percent"] < 0.1, volume
-        assert not any("crowd less" in note for note in card.notes)
-    monkeypatch.setattr(subject, "REFERENCE_STRANDS", 20)
-    assert sum("crowd less" in note for note in evaluate(tmp_path / "hair.usdc", reference=True).notes) == 1
-
-
-def coiled(path, strands=12, vertices=150):
-    """Make a shot's groom coils: ten turns of 8 mm radius on straight lines of 20 cm."""
-    stage = Usd.Stage.Open(str(path))
-    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair"))
-    share = np.linspace(0, 1, vertices)
-    angle, radius = 20 * np.pi * share, 0.008 * np.minimum(1, 6 * share)
-    turns = np.stack([radius * np.cos(angle), -0.2 * share, radius * np.sin(angle)], axis=1)
-    points = strand_points(strands, 2)[:, :1] + turns
-    curves.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(points.reshape(-1, 3).astype(np.float32)))
-    curves.GetCurveVertexCountsAttr().Set([vertices] * strands)
-    stage.Save()
-    return path
-
-
-def test_of_coils_the_motion_of_their_lines_is_measured(tmp_path):
-    """The solver moves the lines: its own bake is neither wrong nor crinkled."""
-    pytest.importorskip("warp", reason="the extra 'train' is not installed")
-    shot = coiled(write_shot(tmp_path, Recipe(frames=24, strands=12)))
-    simulate(shot, tmp_path / "hair.usdc")
-    card = evaluate(tmp_path / "hair.usdc", reference=True)
-    values, bake_row = card.grooms["/Hero/Hair"], card.compared["/Hero/Hair"]["bake"]
-    assert values["turn_degrees"] == pytest.approx(values["turn_at_rest_degrees"], rel=0.2)
-    assert values["energy_bend"] < 0.02
-    assert bake_row["motion_error_median"] < 0.03 and bake_row["position_percent"] < 0.3
-
-
 def test_of_a_groom_without_hair_nothing_is_claimed(tmp_path, model):
     shot = write_shot(tmp_path)
     stage = Usd.Stage.Open(str(shot))
@@ -176,39 +109,6 @@ def test_a_model_is_shown_beside_the_reference_only(rigid):
 def test_a_stage_without_samples_is_no_bake():
     with pytest.raises(NeuralocksError, match="no animated points"):
         read_baked(shipped_shot())
-
-
-def test_demo_makes_everything_it_names(tmp_path, still_model, monkeypatch, capsys):
-    import usd.review.demo
-
-    short = lambda *args, **options: bake(*args, frames="1:9:2", **options)  # noqa: E731
-    monkeypatch.setattr(usd.review.demo, "bake", short)
-    done = demo(tmp_path / "out", still_model, clip=False)
-    assert all(path.is_file() for path in done.outputs.values())
-    assert json.loads(done.outputs["report card"].read_text())["grooms"]
-    told = replace(done, bake=replace(done.bake, notes=["of the bake"]), notes=["of the picture"])
-    monkeypatch.setattr(usd.review.demo, "demo", lambda *args, **options: told)
-    with pytest.raises(SystemExit):
-        main(["demo", "--json"])
-    assert json.loads(capsys.readouterr().out)["notes"] == ["of the bake", "of the picture"]
-
-
-def test_the_demo_notes_a_missing_library_and_fails_where_a_picture_cannot_be_written(tmp_path, monkeypatch):
-    """A full disk was a note beside the report card."""
-    import usd.review.demo
-
-    def preview(_baked, path, **_options):
-        raise errors.pop()(f"{path.name}: of the picture")
-
-    for name in ("bake", "read_baked"):
-        monkeypatch.setattr(usd.review.demo, name, lambda *args, **options: None)
-    monkeypatch.setattr(usd.review.demo, "evaluate", lambda *args, **options: Card("", {}, {}, {}))
-    monkeypatch.setattr(usd.review.demo, "preview", preview)
-    errors = [LacksLibrary, LacksLibrary]
-    assert demo(tmp_path).notes == ["demo.png: of the picture", "demo.mp4: of the picture"]
-    errors = [CannotWrite]
-    with pytest.raises(CannotWrite, match=r"demo\.png"):
-        demo(tmp_path)
 
 
 def test_only_what_was_baked_is_measured(tmp_path, model):
