@@ -114,6 +114,28 @@ def dancer(count: int = 60, *, skinned: bool = False, **strands):
     return rig, hair(rig, count, **strands)
 
 
+def dancer_with_shapes() -> tuple:
+    """A dancing rig, alone in the file, with hair and a body with shape keys: held, keyed and driven by the neck."""
+    empty()
+    rig, _ = dancer(10, skinned=True)
+    skin = bpy.data.objects["Body"]
+    skin.shape_key_add(name="Basis")
+    for name in ("Held", "Keyed", "Driven"):
+        block = skin.shape_key_add(name=name)
+        for point in block.data:
+            point.co.x *= 1.2
+    blocks = skin.data.shape_keys.key_blocks
+    blocks["Held"].value = 0.5
+    for frame in (1, 24):
+        blocks["Keyed"].value = frame / 24
+        blocks["Keyed"].keyframe_insert("value", frame=frame)
+    driver = blocks["Driven"].driver_add("value").driver
+    variable, driver.expression = driver.variables.new(), "var"
+    variable.type, target = "TRANSFORMS", variable.targets[0]
+    target.id, target.bone_target, target.transform_type = rig, "neck", "ROT_X"
+    return rig, skin
+
+
 def dance(rig, frames=(1, 24)) -> None:
     """Key frames: a head shake, a bow and a step."""
     first, last = frames

@@ -7,8 +7,7 @@ from unittest.mock import patch
 import bpy
 
 from tests.blender import scenes
-from tests.blender.checks import choose, make_live, needs_usd
-from tests.blender.panel import drawn
+from tests.blender.checks import choose, make_live
 
 
 def looked_for_again(_folder: Path) -> None:
@@ -20,7 +19,7 @@ def looked_for_again(_folder: Path) -> None:
         *(_keyed, _keys_replaced, _strip_added, _drawn_by_keys, _drawn_by_no_keys, _drawn_by_no_driver),
     )
     for edit in edits:
-        rig, skin = _character()
+        rig, skin = scenes.dancer_with_shapes()
         if edit in (_drawn_by_no_keys, _drawn_by_no_driver):
             (_keys_drawing if edit is _drawn_by_no_keys else _driver_drawing)(skin)
         before = _known(rig)
@@ -34,7 +33,7 @@ def not_looked_for_again(_folder: Path) -> None:
     """A pose, also one that drives shape keys, and whatever else an artist moves, is no reason to look; with driven keys, neither to read
     the body.
     """
-    rig, skin = _character()
+    rig, skin = scenes.dancer_with_shapes()
     prop = bpy.data.objects.new("Prop", bpy.data.meshes.new("Prop"))
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     for thing in (prop, lamp):
@@ -60,93 +59,6 @@ def not_looked_for_again(_folder: Path) -> None:
     assert _fresh(rig) == before
 
 
-def driven_since(folder: Path) -> None:
-    """If a driver of a body's shape keys is edited after hair was attached, a note says so until it is as before, also when the file is
-    opened again; new names are no edit.
-    """
-    needs_usd()
-    rig, skin = _character()
-    make_live(rig, bpy.data.objects["Hair"])
-    scene = bpy.context.scene
-    scene.neuralocks.output = str(folder / "hair.usdc")
-    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
-    rig, skin = bpy.data.objects["Rig"], bpy.data.objects["Body"]
-    (curve,) = skin.data.shape_keys.animation_data.drivers
-    variable = curve.driver.variables[0]
-    target = variable.targets[0]
-    for owner, name, other in (
-        (curve.driver, "expression", "2 * var"),
-        (target, "bone_target", "head"),
-        (target, "transform_type", "ROT_Z"),
-        (curve, "mute", True),
-    ):
-        before = getattr(owner, name)
-        for value in (other, before):
-            setattr(owner, name, value)
-            # A key that nothing drives any longer is part of the body's shape.
-            parts = [] if value == before else ["body"] * (name == "mute") + ["drivers of the body"]
-            assert _told() == parts, (name, _told())
-    rig.name = rig.data.name = skin.name = skin.data.name = "Another"
-    skin.data.shape_keys.key_blocks["Driven"].name = "Frown"
-    rig.data.bones["neck"].name = "Throat"
-    assert not _told(), _told()
-    curve.driver.expression = "0.5 * var"
-    bpy.context.view_layer.update()
-    bpy.ops.wm.save_mainfile()
-    bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
-    assert _told() == ["drivers of the body"]
-    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
-
-
-def drivers_told(_folder: Path) -> None:
-    """Each edit of a driver changes the number of drivers."""
-    from dcc_addon.scene.driven import number_of_drivers
-
-    rig, skin = _character()
-    curve = skin.data.shape_keys.animation_data.drivers[0]
-    limits = curve.modifiers.new("LIMITS")
-    variable = curve.driver.variables[0]
-    variable.type, target = "SINGLE_PROP", variable.targets[0]
-    target.id, target.data_path = rig, 'pose.bones["neck"].rotation_euler[0]'
-    seen = [number_of_drivers(skin.data)]
-    for edit in (
-        lambda: setattr(target, "data_path", 'pose.bones["head"].rotation_euler[0]'),
-        lambda: setattr(target, "data_path", 'pose.bones["head"].rotation_euler[1]'),
-        lambda: setattr(curve.driver, "use_self", True),
-        lambda: setattr(limits, "max_y", 2.0),
-        lambda: curve.keyframe_points.insert(1.0, 2.0),
-        lambda: setattr(curve, "data_path", 'key_blocks["Held"].value'),
-    ):
-        edit()
-        found = number_of_drivers(skin.data)
-        assert found not in seen, len(seen)
-        seen.append(found)
-
-
-def _character() -> tuple:
-    """A dancing rig with hair and a body with shape keys: held, keyed and driven by the neck."""
-    scenes.empty()
-    rig, _ = scenes.dancer(10, skinned=True)
-    skin = bpy.data.objects["Body"]
-    skin.shape_key_add(name="Basis")
-    for name in ("Held", "Keyed", "Driven"):
-        block = skin.shape_key_add(name=name)
-        for point in block.data:
-            point.co.x *= 1.2
-    blocks = skin.data.shape_keys.key_blocks
-    blocks["Held"].value = 0.5
-    for frame in (1, 24):
-        blocks["Keyed"].value = frame / 24
-        blocks["Keyed"].keyframe_insert("value", frame=frame)
-    driver = blocks["Driven"].driver_add("value").driver
-    variable, driver.expression = driver.variables.new(), "var"
-    variable.type, target = "TRANSFORMS", variable.targets[0]
-    target.id, target.bone_target, target.transform_type = rig, "neck", "ROT_X"
-    return rig, skin
-
-
 def _known(rig):
     from dcc_addon.scene.body_known import numbers_of_bodies
 
@@ -160,13 +72,6 @@ def _fresh(rig):
     session.bodies.clear()
     session.surfaces.clear()
     return _known(rig)
-
-
-def _told() -> list[str]:
-    """The parts that the panel says were changed since the hair was attached."""
-    bpy.context.view_layer.update()
-    said = " ".join(drawn())
-    return said.split("shows it as it was: ")[1].split("; ")[0].split(", ") if "as it was" in said else []
 
 
 def _hidden(_rig, skin) -> None:
