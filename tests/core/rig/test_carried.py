@@ -89,9 +89,11 @@ def test_a_negative_strength_is_refused_as_a_bake_does():
         carried.turns(TIMES, strength=-1.0)
 
 
-@pytest.mark.parametrize("how", ["turn", "shift", "still", "bent"])
+@pytest.mark.parametrize("how", ["turn", "shift", "still", "bent", "hidden", "mirrored"])
 def test_offsets_between_hair_joints_that_move_are_found(how):
-    """Not joints that hair itself moves, a carrier above it, nor an offset that is held elsewhere than in the bind pose."""
+    """Not joints that hair itself moves, a carrier above it, nor an offset that is held elsewhere than in the bind pose, or that has
+    no readable turn in some frames.
+    """
     at = {name: place for name, _, place in tail("hair", 4)}
     rows = [("hat", "head", (0, 1.7, 0)), ("hair_1", "hat", at["hair_1"]), ("off", "hair_1", at["hair_2"])]
     rows += [("hair_2", "off", at["hair_2"]), ("hair_3", "hair_2", at["hair_3"]), ("hair_4", "hair_3", at["hair_4"])]
@@ -100,10 +102,12 @@ def test_offsets_between_hair_joints_that_move_are_found(how):
     chains = find_chains(who, [skin(who, dict.fromkeys(("hair_1", "hair_2", "hair_3"), points))])
     assert chains.names == ("hair_1", "hair_2", "hair_3")
     off = [name.rsplit("/", 1)[-1] for name in who.skeleton.names].index("off")
-    turned = {"turn": NODDING, "bent": np.full((len(TIMES), 3), 0.3)}.get(how, 0 * NODDING)
+    turned = {"bent": np.full((len(TIMES), 3), 0.3)}.get(how, 0 * NODDING if how in ("shift", "still") else NODDING)
     motion = clip(who.skeleton, "off", turned, "off")
     motion.joints[20:, who.skeleton.below(off), 1, 3] += 0.05 * (how == "shift")
     for joint in ("hat", "hair_3"):
         move = clip(who.skeleton, joint, NODDING, "head").joints @ who.inverse_bind
         motion.joints[:] = move @ motion.joints
+    scales = {"hidden": 0.0, "mirrored": np.array([-1.0, 1, 1])}
+    motion.joints[20:, who.skeleton.below(off), :3, :3] *= scales.get(how, 1.0)
     assert moved_between(chains, who, motion) == ([off] if how in ("turn", "shift") else [])

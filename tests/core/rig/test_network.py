@@ -105,7 +105,12 @@ def test_model_file_round_trip(tmp_path):
         ({"chain": [-1] * 16}, "another chain than its parent"),
         ({"chain": [0, 1, *[0] * 14]}, "another chain than its parent"),
         ({"parents": [3] * 16}, "comes before its parent"),
+        ({"parents": [-2] + [-1] * 15}, "comes before its parent"),
         ({"bone_joint": [40] * 16}, "names a joint that is not there"),
+        ({"bone_joint": [-1] * 16}, "names a joint that is not there"),
+        ({"bone_end": [16] * 16}, "names a joint that is not there"),
+        ({"bones": [[0, 1, 0]]}, r"bones is \(1, 3\), not \(16, 3\)"),
+        ({"origins": [[np.nan, 0, 0]] * 16}, "NaN or infinity in the bind pose"),
     ],
 )
 def test_forged_chains_are_refused_in_one_line(forged, said):
