@@ -64,7 +64,7 @@ def export_c(model: RigModel, path, prefix: str = "nl_hair") -> Path:
         if file.is_file() and not made_here(file):
             raise NeuralocksError(f"{file}: would be overwritten by the {what}; move it, or name another header")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", prefix):
-        raise NeuralocksError(f"--prefix {prefix}: is not a C name; use letters, digits and _")
+        raise NeuralocksError(f"--prefix {prefix}: give a letter, then up to 40 letters without accents, digits and _")
     known = rig_spec(model.dynamic)
     read_alike = all(getattr(model.spec, name) == getattr(known, name) for name in ("pose_joints", "linear", "chest"))
     if not read_alike:

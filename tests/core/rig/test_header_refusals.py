@@ -27,3 +27,21 @@ def test_limits_that_the_header_does_not_keep_are_refused(tmp_path):
     with pytest.raises(NeuralocksError, match=r"clamps entries of rotations to 0\.625, .*give it the limits of"):
         export_c(replace(model, limits=0.5 * model.limits), tmp_path / "hair.h")
     export_c(replace(model, limits=0.82 * model.limits), tmp_path / "hair.h")
+
+
+@pytest.mark.parametrize("name", ["hair", "hair.c", "hair.H"])
+def test_a_header_has_a_headers_name(tmp_path, name):
+    with pytest.raises(NeuralocksError, match=r"a header ends in \.h or \.hpp"):
+        export_c(random_model(), tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("prefix", ["", "my hair", "2nd", "_hair", "härchen", "a" * 42])
+def test_a_prefix_that_no_name_in_c_begins_with_is_refused(tmp_path, prefix):
+    """The longest one is fine: what is told is how to do it."""
+    export_c(random_model(), tmp_path / "fine.h", "a" * 41)
+    with pytest.raises(
+        NeuralocksError, match=f"--prefix {prefix}: give a letter, then up to 40 letters without accents, digits"
+    ):
+        export_c(random_model(), tmp_path / "hair.h", prefix)
+    assert not (tmp_path / "hair.h").exists()

@@ -91,6 +91,9 @@ def test_model_file_round_trip(tmp_path):
     ):
         with pytest.raises(NeuralocksError, match=f"odd.neuralocks: .*{fact}; get"):
             RigModel.load(model_file.write(tmp_path / "odd.neuralocks", {**file.meta, **meta}, file.graphs))
+    few = {name: value for name, value in file.meta.items() if name != "limits"}
+    with pytest.raises(NeuralocksError, match="odd.neuralocks: its description lacks 'limits'; get"):
+        RigModel.load(model_file.write(tmp_path / "odd.neuralocks", few, file.graphs))
     path.write_bytes(path.read_bytes()[:-200])
     with pytest.raises(NeuralocksError, match="m.neuralocks"):
         RigModel.load(path)
@@ -109,6 +112,8 @@ def test_model_file_round_trip(tmp_path):
         ({"bone_joint": [40] * 16}, "names a joint that is not there"),
         ({"bone_joint": [-1] * 16}, "names a joint that is not there"),
         ({"bone_end": [16] * 16}, "names a joint that is not there"),
+        ({"names": [1] * 16}, "unreadable hair chains"),
+        ({"joints": ["x"] * 16}, "unreadable hair chains"),
         ({"bones": [[0, 1, 0]]}, r"bones is \(1, 3\), not \(16, 3\)"),
         ({"origins": [[np.nan, 0, 0]] * 16}, "NaN or infinity in the bind pose"),
     ],
@@ -118,6 +123,30 @@ def test_forged_chains_are_refused_in_one_line(forged, said):
     assert len(HairChains.from_json(values)) == 16
     with pytest.raises(NeuralocksError, match=said):
         HairChains.from_json(values | forged)
+
+
+def test_layers_and_limits_that_do_not_fit_are_refused():
+    """Those of a damaged or forged file, each by its own fact; a NaN would be the turn of each joint."""
+    model = random_model()
+    (first, bias), *others = model.layers
+    for layers, fact in (
+        (((first[:, 1:], bias), *others), "layers do not fit together"),
+        (((first, bias[1:]), *others), "layers do not fit together"),
+        (((first, bias), *others, *others), "layers do not fit together"),
+        (((first, bias),), "does not give three numbers per hair joint"),
+        (((first * np.nan, bias), *others), "NaN or infinity in its weights"),
+        (((first, bias + np.inf), *others), "NaN or infinity in its weights"),
+    ):
+        with pytest.raises(NeuralocksError, match=f"model: .*{fact}; get an undamaged copy"):
+            replace(model, layers=layers)
+    for damage in (
+        {"limits": model.limits[1:]},
+        {"limits": np.nan * model.limits},
+        {"max_angle": 0.0},
+        {"max_angle": 3.2},
+    ):
+        with pytest.raises(NeuralocksError, match="input limits do not fit its inputs"):
+            replace(model, **damage)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,13 @@ from tests.core.rig.builders import character, skin, tail
     [
         ([], None, "no hair chains"),
         (tail("hair", 3, step=(0, 0, 0)), None, "has no length"),
+        (tail("hair", 1), None, "hair joint 'hair_1' drives no vertices and has no child; skin the hair to its joints"),
         (tail("hair", 2), ["nothing*"], "no joint has such a name"),
+        (
+            tail("cape", 2, parent="chest"),
+            ["cape*"],
+            "joint 'cape_1' does not hang below the head joint 'head', but from 'chest': name that with --head chest",
+        ),
         (
             tail("hair", 2),
             ["chest"],
@@ -51,6 +57,8 @@ def test_a_model_for_other_chains_is_refused():
     longer = find_chains(character(tail("hair", 3, step=(0, -0.08, 0))))
     with pytest.raises(NeuralocksError, match="away from its place"):
         chains.check_same(longer)
+    with pytest.raises(NeuralocksError, match="moves joint 'hair_1', which is not a hair joint here; train a model"):
+        chains.check_same(find_chains(character(tail("lock", 3))))
     assert HairChains.from_json(chains.to_json()).names == chains.names
 
 
@@ -86,6 +94,19 @@ def test_a_rig_with_another_joint_called_as_a_chain_is_refused_before_it_is_trai
     who = Character(replace(rig, names=[name.replace("/tip", "/lock_1") for name in rig.names]))
     with pytest.raises(NeuralocksError, match="2 joints below the head are named 'lock_1', like a hair chain; rename"):
         find_chains(who)
+
+
+def test_two_hair_joints_of_one_name_are_refused():
+    rig = character([*tail("lock", 3), *tail("hair", 3)]).skeleton
+    who = Character(replace(rig, names=[name.replace("/hair_2", "/lock_2") for name in rig.names]))
+    with pytest.raises(NeuralocksError, match="two hair joints are named 'lock_2'; give each its own name"):
+        find_chains(who)
+
+
+def test_hair_joints_that_drive_no_skin_are_named():
+    who = character(tail("hair", 3))
+    with pytest.raises(NeuralocksError, match="'hair_1' drives no vertex of a mesh: bind the hair's mesh to it"):
+        find_chains(who, [skin(who, {"head": np.eye(3) * 0.1 + [0, 1.6, 0]})])
 
 
 def test_hair_below_another_joint_than_the_head_names_it():
