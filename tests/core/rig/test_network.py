@@ -108,6 +108,7 @@ def test_model_file_round_trip(tmp_path):
         ({"chain": [-1] * 16}, "another chain than its parent"),
         ({"chain": [0, 1, *[0] * 14]}, "another chain than its parent"),
         ({"parents": [3] * 16}, "comes before its parent"),
+        ({"parents": [0] + [-1] * 15}, "comes before its parent"),
         ({"parents": [-2] + [-1] * 15}, "comes before its parent"),
         ({"bone_joint": [40] * 16}, "names a joint that is not there"),
         ({"bone_joint": [-1] * 16}, "names a joint that is not there"),
