@@ -173,7 +173,10 @@ class _Search:
         if self.positions is None or not lacking:
             return
         found = limbs_by_shape(self.way, self.parents, self.positions, self.sides)
-        for name, joint in (each for limb in lacking for each in found.get(limb, {}).items()):
+        # By shape, hanging arms that end lower than all else are legs.
+        known = {joint for limb in LIMBS for joint in self._both(f"upper_{limb}")}
+        found = {limb: part for limb, part in found.items() if limb in lacking and known.isdisjoint(part.values())}
+        for name, joint in (each for part in found.values() for each in part.items()):
             lower = name.replace("upper", "lower")
             if lower != name and self.joints.get(lower) == joint and self.reasons[lower] != BY_HAND:
                 del self.joints[lower]  # `Leg` is the lower leg only below another leg joint

@@ -82,11 +82,29 @@ def test_a_rig_without_a_head_is_refused_with_the_remedy():
         find_humanoid(paths, parents)
 
 
+def test_a_hand_is_what_is_farthest_from_its_shoulder():
+    """Not what is farthest from where the character stands, as a sleeve is whose arm hangs."""
+    arm = "  upperarm_{0}\n   a_{0}\n    sleeve_{0}\n    b_{0}\n"
+    paths, parents = rig("hips\n spine\n  head\n" + arm.format("L") + arm.format("R").rstrip())
+    places = {"hips": (0, 1), "spine": (0, 1.2), "head": (0, 1.6)}
+    places |= {"upperarm": (0.2, 1.4), "a": (0.25, 1.15), "sleeve": (0.4, 1.2), "b": (0.27, 0.9)}
+    leaves = [path.rpartition("/")[2] for path in paths]
+    at = np.array([(*places[name.partition("_")[0]], 0) for name in leaves])
+    at[:, 0] *= [-1 if name.endswith("R") else 1 for name in leaves]
+    found = find_humanoid(paths, parents, at)
+    for side in ("left", "right"):
+        letter = side[0].upper()
+        assert leaves[found[f"{side}_lower_arm"]] == f"a_{letter}" and leaves[found[f"{side}_hand"]] == f"b_{letter}"
+    assert leaves[found["hips"]] == "hips" and not any("leg" in name for name in found)
+
+
 def test_missing_joints_fall_back_towards_the_trunk():
     paths, parents = rig("hips\n spine\n  head\n  shoulder_L\n   upper_arm_L")
     humanoid = find_humanoid(paths, parents)
     wanted = {"left_lower_arm": "upper_arm_L", "right_lower_arm": "spine", "right_shoulder": "spine", "neck": "head"}
     assert {name: paths[humanoid.nearest(name)].rpartition("/")[2] for name in wanted} == wanted
+    paths, parents = rig("hips\n a\n  b\n   c\n    head")
+    assert paths[find_humanoid(paths, parents)["upper_chest"]].endswith("/b")
 
 
 CONTROLS = (
@@ -150,6 +168,13 @@ def test_of_joints_numbered_alike_the_one_that_moves_skin_is_the_head():
     skinned = np.array(["DEF" in path.rpartition("/")[2] for path in paths])
     found = [find_humanoid(paths, parents, skinned=each)["head"] for each in (None, skinned)]
     assert [paths[head].rpartition("/")[2] for head in found] == ["ORG_spine_006", "DEF_spine_006"]
+
+
+def test_of_an_animal_numbered_from_its_tail_the_last_joint_is_the_head():
+    """Though the tail is the longer way from the root."""
+    tail = "".join(f"{' ' * (5 - n)}DEF_spine_{n:03}\n" for n in (5, 4, 3, 2, 1))
+    paths, parents = rig(f"{tail} DEF_spine_006\n  DEF_spine_007\n   DEF_spine_008")
+    assert paths[find_humanoid(paths, parents)["head"]].endswith("_008")
 
 
 def test_a_neck_numbered_like_the_spine_begins_above_the_shoulders():
