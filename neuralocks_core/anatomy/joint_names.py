@@ -104,7 +104,7 @@ def own_names(names: Sequence[str], head: int | None) -> list[str]:
     own = [without_namespace(leaf(name)) for name in names]
     if head is None:
         return own
-    beside = [j for j, name in enumerate(names) if j == head or not name.startswith(f"{names[head]}/")]
+    beside = [j for j, name in enumerate(names) if not name.startswith(f"{names[head]}/")]
     while True:
         first, *rest = _own_words(own[head]) or [""]
         meant = first in _SIDES or first in _TRUNK

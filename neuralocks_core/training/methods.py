@@ -107,7 +107,6 @@ class MomentMethod:
         """Strand inputs (n, 142) and boundary vectors (m, F) as they occur in training."""
         frames = np.concatenate([m.vectors for m in self.pool.moments])
         if not self.options.random_materials:
-            frames = frames.copy()
             frames[:, self.pool.scene.spec.slices["material"]] = 0
         return np.concatenate([inputs[:: max(1, len(inputs) // 500)] for inputs in self.inputs]), frames
 

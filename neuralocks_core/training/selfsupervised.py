@@ -66,6 +66,4 @@ def train_on_moments(
 
 def _dynamics(options: SelfSupervisedOptions, done: float) -> float:
     """Factor on inertia at a share of the budget."""
-    if options.static:
-        return 0.0
     return float(np.clip((done - options.warmup) / 0.1, 0.0, 1.0)) if options.warmup else 1.0
