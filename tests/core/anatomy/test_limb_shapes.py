@@ -73,7 +73,7 @@ def about_y(degrees: float) -> np.ndarray:
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
 
-@pytest.mark.parametrize("turn", [np.eye(3), Z_UP], ids=["Y up", "Z up"])
+@pytest.mark.parametrize("turn", [np.eye(3), Z_UP, 100 * Z_UP], ids=["Y up", "Z up", "centimetres"])
 def test_limbs_are_found_among_capes_skirts_and_tails(turn):
     assert limbs(turn=turn) == MEANT
 
@@ -113,6 +113,15 @@ def test_twist_joints_make_no_hand_of_an_elbow():
         for n in (1, 2)
     }
     assert limbs(JOINTS | TOES | twists) == MEANT
+
+
+def test_half_a_character_has_arms():
+    """And no feet that tell where it looks."""
+    half = {name: joint for name, joint in JOINTS.items() if joint[1][1] > 0.9 or name == "root"}
+    for name in ("skirt", "thigh", "cape", "cape2", "tail", "tail2", "tail3"):
+        half = {each: joint for each, joint in half.items() if each.partition("_")[2] != name}
+    arms = {part: joint for part, joint in MEANT.items() if "leg" not in part and "foot" not in part}
+    assert limbs(half) == arms and limbs(half, turn=Z_UP) == arms
 
 
 def test_a_trunk_alone_and_broken_places_have_no_limbs():

@@ -32,6 +32,14 @@ def test_by_whatever_angle_parents_turn_a_character_it_stands(axis, angle):
         np.testing.assert_allclose(found @ [0, 1, 0], [0, 1, 0], atol=1e-9)
 
 
+@pytest.mark.parametrize("beside, nearest", [(20, True), (-25, True), (40, False)])
+def test_where_nothing_tells_what_is_up_parents_turn_by_the_nearest_quarter(beside, nearest):
+    """If it is near: `placed` may be anything else."""
+    placed = Rotation.from_euler("x", 90 + beside, degrees=True).as_matrix()
+    found = standing(placed, UPRIGHT[1:2], Humanoid({"head": 0}), np.array([0, 1.0, 0]))
+    np.testing.assert_allclose(found, Z_UP if nearest else placed, atol=1e-9)
+
+
 def test_without_legs_a_level_trunk_may_be_an_animals():
     trunk = Humanoid({"hips": 0, "head": 1})
     assert lies(ON_ALL_FOURS, trunk, np.array([0, 1, 0])) == (True, False)

@@ -219,3 +219,11 @@ def test_a_person_may_stand_along_another_axis(woman, tmp_path, up, zero):
     assert (motion.unit, motion.up, motion.guessed) == (0.01, up, False)
     clip = retarget(motion, woman)
     assert np.allclose(clip.joints, expected.joints, atol=1e-6)
+
+
+def test_without_toes_ankles_tell_where_the_floor_is(tmp_path):
+    """In a take that is recorded above it."""
+    motion = read_bvh(write_bvh(tmp_path / "take.bvh", [{}] * 3, places=[(0, 130, 0)] * 3))
+    who = Character(read_bvh(write_bvh(tmp_path / "stands.bvh", [{}])).skeleton)
+    assert not set(who.skeleton.parents) & {who.humanoid[f"{side}_foot"] for side in ("left", "right")}
+    np.testing.assert_allclose(retarget(motion, who).joints[1], who.skeleton.bind, atol=1e-9)
