@@ -5,9 +5,12 @@ import numpy as np
 import pytest
 
 from neuralocks_core import rotation
-from neuralocks_core.animation.gestures import FOREIGN, KINDS, WILD
-from neuralocks_core.animation.random_motion import check_weights, random_clip, scripted_clip
+from neuralocks_core.animation import random_motion
+from neuralocks_core.animation.gestures import FOREIGN, GESTURES, KINDS, WILD
+from neuralocks_core.animation.puppet import Puppet
+from neuralocks_core.animation.random_motion import _posture, check_weights, random_clip, scripted_clip
 from neuralocks_core.errors import NeuralocksError
+from tests.core.rig.builders import character
 from tests.core.rigs import HEAD, person
 
 TURNS = {"shake": 12, "turn": 12, "nod": 12, "bow": 30, "tilt": 12, "hold": 12}
@@ -31,6 +34,7 @@ def test_the_same_seed_gives_the_same_clip():
 def test_random_clips_are_rigid_start_still_and_stay_human(seed):
     clip = random_clip(person(), np.random.default_rng(seed), 3.65)
     turns = clip.joints[..., :3, :3]
+    assert np.allclose(np.diff(clip.times), 1 / 30) and clip.end == pytest.approx(3.65, abs=0.02)
     assert np.allclose(turns @ turns.swapaxes(-1, -2), np.eye(3), atol=1e-9)
     assert acceleration(clip)[:5].max() < 2.0
     assert acceleration(clip).max() < 250.0
@@ -56,6 +60,42 @@ def test_so_many_stop_midway():
         for seed in range(80)
     ]
     assert 12 <= sum(not np.array_equal(*pair) for pair in pairs) <= 36
+
+
+def test_clips_have_up_to_three_gestures_and_some_of_them_more(monkeypatch):
+    """One in five is wild; two in five fidget, if they do not hold a pose."""
+    done = []
+    for kind in GESTURES:
+        monkeypatch.setitem(GESTURES, kind, lambda *_, kind=kind: done[-1].add(kind))
+    monkeypatch.setattr(random_motion, "_fidget", lambda *_: done[-1].add("fidget"))
+    for seed in range(400):
+        done.append(set())
+        random_clip(person(), np.random.default_rng(seed), 0.1)
+    assert np.mean([bool(kinds & {*WILD}) for kinds in done]) == pytest.approx(0.2, abs=0.06)
+    assert np.mean(["fidget" in kinds for kinds in done if "hold" not in kinds]) == pytest.approx(0.4, abs=0.08)
+    assert not any({"fidget", "hold"} <= kinds for kinds in done)
+    counts = np.bincount([len(kinds & {*KINDS}) for kinds in done], minlength=5) / 400
+    assert counts[[0, 4]].tolist() == [0, 0] and counts[1:3] == pytest.approx([0.43, 0.4], abs=0.08)
+    done.clear()
+    for seed in range(40):
+        done.append(set())
+        random_clip(person(), np.random.default_rng(seed), 0.1, wild=0)
+    assert not set.union(*done) & {*WILD}
+
+
+def test_arms_are_lifted_outward_and_forward():
+    """Not into the body, where hair would meet them."""
+    who, lowest, highest = character(), [], []
+    chest, arms = who.humanoid["upper_chest"], [who.humanoid[f"{side}_lower_arm"] for side in ("left", "right")]
+    for seed in range(60):
+        puppet = Puppet(who, np.arange(30) / 6)
+        _posture(puppet, np.random.default_rng(seed))
+        joints = puppet.clip().joints
+        elbows = np.einsum("tij,taj->tai", np.linalg.inv(joints[:, chest]), joints[:, arms][..., 3])
+        assert (elbows[..., 0] * [1, -1] > 0.1).all() and (elbows[..., 2] > -0.1).all(), seed
+        lowest.append(elbows[..., 1].min())
+        highest.append(elbows[..., 1].max())
+    assert max(highest) - min(lowest) > 0.3
 
 
 def jumps(weights, seeds):
