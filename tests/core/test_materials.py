@@ -31,6 +31,18 @@ def test_ends_of_a_range_are_taken_and_what_lies_beyond_is_refused(name):
             Material(**{name: value})
 
 
+def test_random_materials_are_the_default_or_anywhere_in_their_ranges():
+    """Each constant by itself, and evenly over the logarithm that the network reads."""
+    rng = np.random.default_rng(0)
+    drawn = [Material.random(rng) for _ in range(600)]
+    for row, (name, (low, high)) in enumerate(RANGES.items()):
+        default = np.array([getattr(each, name) == getattr(Material(), name) for each in drawn])
+        assert default.mean() == pytest.approx(1 / 3, abs=0.07), name
+        ends = [Material(**{name: end}).log_ratios()[row] for end in (low, high)]
+        share = (np.array([each.log_ratios()[row] for each in drawn])[~default] - ends[0]) / (ends[1] - ends[0])
+        assert np.percentile(share, [5, 25, 50, 75, 95]) == pytest.approx([0.05, 0.25, 0.5, 0.75, 0.95], abs=0.07), name
+
+
 @pytest.mark.parametrize("value", ["1", None, True, [1.0]])
 def test_what_is_no_number_is_refused_in_words(value):
     with pytest.raises(NeuralocksError, match="material bend: .* is not a number; give one from 0.0002 to 0.005"):

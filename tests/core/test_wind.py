@@ -23,6 +23,13 @@ def test_without_gusts_it_is_steady():
     assert np.array_equal(Wind((1, 2, -3), 0.0).at([0.0, 7.3, -1e3]), np.tile([1.0, 2, -3], (3, 1)))
 
 
+def test_the_same_numbers_are_the_same_wind():
+    """However they were given; files of USD and JSON take them as they are kept."""
+    given = Wind(np.float32([1, 2, -3]))
+    assert given == Wind((1, 2, -3)) and hash(given) == hash(Wind([1, 2, -3]))
+    assert [type(number) for number in given.mean] == [float] * 3
+
+
 def test_gusts_vary_it_by_their_share_and_leave_its_mean():
     wind = Wind((0, 0, 4), 0.75)
     blown = wind.at(np.arange(0, 600, 0.05))

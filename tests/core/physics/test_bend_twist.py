@@ -27,6 +27,13 @@ def test_an_arch_bent_from_straight_has_the_energy_of_its_curvature():
         assert energy.item() == pytest.approx(expected, rel=1e-4)
 
 
+def test_a_right_angle_of_a_constant_director_by_hand():
+    """Half of k |e - e0|^2 over the length between the edges."""
+    rest = straight(3, 0.2)
+    bent = rest + torch.tensor([[0.0, 0, 0], [0, 0, 0], [0.1, 0.1, 0]])
+    assert bend_twist(bent, rods(rest), 3.0, Cosserat.CONSTANT).item() == pytest.approx(0.5 * 3.0 * 2 / 0.1)
+
+
 def test_the_two_exact_transports_agree_and_are_orthogonal_to_the_tangent(curls):
     edges = torch.nn.functional.normalize(moved(curls).diff(dim=-2), dim=-1)
     torch.testing.assert_close(scan_frames(edges), loop_frames(edges), atol=1e-14, rtol=0)
@@ -84,6 +91,13 @@ def test_a_doubled_point_turns_nothing(form, doubled):
         gradients.append(torch.autograd.grad(energies[-1], x)[0])
     torch.testing.assert_close(energies[1], energies[0])
     torch.testing.assert_close(gradients[1], gradients[0])
+
+
+@pytest.mark.parametrize("form", [Cosserat.LOOP, Cosserat.SCAN])
+def test_strands_with_doubled_points_bend_as_each_alone(form):
+    x = torch.cat([torch.cat([p[:, : at + 1], p[:, at:]], dim=1) for at in (0, 5, 12) for p in [_bent_behind()]])
+    together = bend_difference(x, straight(25).expand_as(x), form)
+    torch.testing.assert_close(together, torch.cat([bend_difference(each[None], straight(25), form) for each in x]))
 
 
 def test_folding_back_is_finite_in_value_and_gradient():

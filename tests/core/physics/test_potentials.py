@@ -183,6 +183,7 @@ def test_adhesion_by_hand_and_its_force_that_of_one_spring():
     rest = torch.cat([straight(), straight() + torch.tensor([0.005, 0, 0])])
     r, k = rods(rest), 60.0
     pair = torch.arange(48).reshape(2, 24, 1).flip(0).to(torch.int32)
+    pair = torch.cat([pair, pair, -torch.ones_like(pair)], -1)  # a mean, over those that are there
     x = rest.clone()
     x[1, :, 2] += 0.002
     assert adhesion(x, r, pair, k)[0].item() == pytest.approx(k * 0.24 * 0.002**2)
@@ -191,6 +192,16 @@ def test_adhesion_by_hand_and_its_force_that_of_one_spring():
     adhesion(y, r, pair, k).sum().backward()
     torch.testing.assert_close(y.grad[:, :, 2], 2 * k * r.mass * torch.tensor([[-0.002], [0.002]]))
     assert y.grad[..., :2].abs().max() < 1e-12
+
+
+def test_crowded_hair_by_hand():
+    """A quarter denser than at rest; less dense hair feels nothing."""
+    r = rods(straight(3, 0.2))
+    dense = volume.density(r.rest, r.mass)
+    assert volume.self_collision(r.rest, r, 0.8 * dense, 2.0).item() == pytest.approx(2.0 * 0.2 * 0.25**3)
+    papers = 2.0 * (r.mass * (0.2 * dense) ** 3).sum().item()
+    assert volume.self_collision(r.rest, r, 0.8 * dense, 2.0, relative=False).item() == pytest.approx(papers)
+    assert volume.self_collision(r.rest, r, 1.1 * dense, 2.0).item() == 0
 
 
 def test_the_kernel_is_normalised_and_ends_smoothly_at_twice_h():
@@ -242,3 +253,6 @@ def test_the_sum_names_only_what_acts(curls):
     )
     terms = energies(curls, rods(curls), around, Stiffness(style=10.0))
     assert len(terms) == 8 and all(term.shape == (4,) for term in terms.values())
+    papers = energies(curls, rods(curls), around, paper_adhesion=True)["adhesion"]
+    torch.testing.assert_close(papers, adhesion(curls, rods(curls), neighbours(), paper=True))
+    assert not terms["adhesion"].any() and (papers > 0).all()
