@@ -13,8 +13,10 @@ from neuralocks_core import rotation
 from neuralocks_core.body.tree_search import surface_tree
 from neuralocks_core.character import Character
 from neuralocks_core.materials import MARGIN, Material
-from neuralocks_core.network_sizes import STRAND, K
+from neuralocks_core.network_sizes import CODE, STRAND, K
 from neuralocks_core.skinned_body import Body
+from neuralocks_core.training import methods
+from neuralocks_core.training.methods import MomentMethod
 from neuralocks_core.training.moment_losses import moment_losses
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.moments import MomentPool, nearest_planes
@@ -77,6 +79,18 @@ def test_inertia_and_damping_are_those_of_the_frames_before(pool):
     assert found["damping"] == pytest.approx(drawn.damping * damping, rel=1e-4)
     told = replace(drawn, weight=1.0).log_ratios()
     assert (net.frames[..., pool.scene.spec.slices["material"]].numpy() == told).all()
+
+
+def test_moments_have_as_many_strands_as_told_and_scale_the_inputs_with_the_materials_that_are_learned(monkeypatch):
+    monkeypatch.setattr(methods, "FIRST", 1)
+    scene = TrainingScene(person(), (straight_hair(),), frames=40)
+    part = scene.spec.slices["material"]
+    for random in (False, True):
+        options = replace(OPTIONS, strands=5, random_materials=random)
+        method = MomentMethod(scene, lambda s: np.zeros((len(s.rest), CODE)), options, None, lambda *_: None)
+        assert [len(hair.strands) for hair in method.pool.hair] == [5]
+        assert method.samples()[1][:, part].any() == random
+        assert any(moment.vectors[:, part].any() for moment in method.pool.moments), "the pool's own stay"
 
 
 def test_each_groom_has_its_style_and_the_last_holds_for_further_ones(pool):

@@ -25,7 +25,7 @@ def _net(motion="linear", static=False, strand_map="linear"):
     torch.manual_seed(0)
     net = StrandNet(100, motion=motion, strand_map=strand_map)
     frames = torch.randn(64, 100) * torch.linspace(0.01, 30, 100) + 2
-    frames[:, 7] = 0.3
+    frames[:, 7:9] = torch.tensor([0.3, -30.0])
     net.set_normalisation(torch.randn(50, STRAND) * 3 + 1, frames, HISTORY, static=static)
     return net
 
@@ -175,7 +175,7 @@ def test_inputs_are_scaled_by_how_far_they_vary_the_history_less_and_details_no_
 def test_an_input_that_never_varied_is_not_read():
     net = _net()
     frames = torch.zeros(2, 100)
-    frames[1, 7] = 50.0
+    frames[1, 7:9] = 50.0
     assert torch.equal(*offsets_of(net, torch.randn(4, STRAND), frames))
 
 

@@ -75,9 +75,9 @@ def swinging():
     return moved
 
 
-def losses(answer, moved, planes=(0.0, 1.0, 0.0, -1000.0)):
-    """Losses of weight 1 each."""
-    options = RegressionOptions(output="displacement", **dict.fromkeys(WEIGHTS, 1.0))
+def losses(answer, moved, planes=(0.0, 1.0, 0.0, -1000.0), **weights):
+    """Losses, of weight 1 each if none is given."""
+    options = RegressionOptions(output="displacement", **{**dict.fromkeys(WEIGHTS, 1.0), **weights})
     batch = {
         "strands": torch.zeros(1, 3, STRAND),
         "rest": torch.zeros(1, 3, K, 3),
@@ -104,6 +104,13 @@ def test_half_the_motion_has_half_of_each_error():
         assert half[name] == pytest.approx(0.5 * none[name], rel=0.02), name
 
 
+def test_each_loss_counts_by_its_own_weight():
+    moved, weights = swinging(), {name: 2.0 + i for i, name in enumerate(WEIGHTS)}
+    plain, weighed = (losses(0.5 * moved, moved, (0.0, 1.0, 0.0, 0.01), **each) for each in ({}, weights))
+    assert min(plain.values()) > 1e-3
+    assert weighed == pytest.approx({name: weights[name] * plain[name] for name in WEIGHTS})
+
+
 def test_each_ratio_leaves_out_what_the_others_measure():
     """Hair that hangs elsewhere swings rightly; a lock that moves as one in the wrong way parts rightly; and both may come to rest."""
     moved = swinging()
@@ -124,7 +131,8 @@ def test_each_ratio_leaves_out_what_the_others_measure():
     ids=["clear", "near", "deep", "as"],
 )
 def test_hair_is_pushed_as_far_out_of_the_body_as_the_solvers_is_and_no_farther_than_the_margin(up, depth):
-    """The answer stays at rest, which is 1 cm below the plane."""
-    moved = torch.zeros(1, 4, 3, K, 3)
-    moved[..., 1] = up
-    assert losses(0 * moved, moved, (0.0, 1.0, 0.0, 0.01))["collision"] == pytest.approx(depth / LENGTH)
+    """The answer stays at rest, which is 1 cm below the plane; what goes along the plane goes no deeper."""
+    across, along = torch.tensor([0.0, 0.8, 0.6]), torch.tensor([0.1, -0.3, 0.4])
+    moved = (up * across + along).expand(1, 4, 3, K, 3).clone()
+    found = losses(0 * moved + along, moved, (*across.tolist(), 0.01))
+    assert found["collision"] == pytest.approx(depth / LENGTH, abs=1e-6)

@@ -14,7 +14,7 @@ from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.character import Character
 from neuralocks_core.measures import MEASURES, body_measures
 from neuralocks_core.skinned_body import Body
-from neuralocks_core.training.rollouts import SHAPES, RolloutMaker, TrainingScene, learned_measures
+from neuralocks_core.training.rollouts import PREROLL, SHAPES, RolloutMaker, TrainingScene, learned_measures
 from tests.core.rigs import HEAD, bind, person, straight_hair
 
 RADIUS = 0.09
@@ -43,6 +43,18 @@ def test_roots_follow_the_scalp_hair_on_it_the_scalp_below_and_free_hair_its_roo
     np.testing.assert_allclose(larger[1, -1] - rest[1, -1], larger[1, 0] - rest[1, 0], atol=1e-9)
     both = maker.fitted(rest, np.array([0.5, 0.3]))
     np.testing.assert_allclose(both - larger, np.broadcast_to([0, 0, 0.03], rest.shape), atol=1e-9)
+
+
+def test_half_of_the_bodies_have_other_shapes_and_a_third_moves_as_given():
+    given = scripted_clip(headed(), "nod", 4.0)
+    maker = RolloutMaker(TrainingScene(headed(), (straight_hair(),), (given,), frames=PREROLL + 2))
+    draws = [maker.draw(index) for index in range(60)]
+    assert 11 <= sum(draw.first == PREROLL for draw in draws) <= 31
+    shapes = np.array([draw.shape for draw in draws])
+    other = shapes.any(axis=1)
+    assert shapes.shape == (60, 2) and 18 <= other.sum() <= 42
+    for low, high in zip(shapes[other].min(axis=0), shapes[other].max(axis=0)):
+        assert -SHAPES <= low < -0.6 * SHAPES and 0.6 * SHAPES < high <= SHAPES
 
 
 def test_a_training_has_seen_the_bodies_between_the_extremes_of_each_shape():
