@@ -2,6 +2,7 @@
 """What networks of hair on bones learn from, and that they learn it: energies by hand, and two short trainings without a body."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from neuralocks_core.rotation import from_vector
 from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig import learning as rig_learning
 from neuralocks_core.training.rig import report as rig_report
-from neuralocks_core.training.rig.contact import GROWING, HairOnBodies, contact_weight
+from neuralocks_core.training.rig import static as rig_static
+from neuralocks_core.training.rig.contact import EVERY, GROWING, RENEWED, HairOnBodies, contact_weight
 from neuralocks_core.training.rig.dynamic import train_dynamic
 from neuralocks_core.training.rig.energy import RigEnergy
 from neuralocks_core.training.rig.motion import _errors, simulate_motions
@@ -137,6 +139,39 @@ def test_a_quasi_static_network_learns_to_hang(quick, monkeypatch):
     saved = energy["network"] / energy["optimised"]
     assert energy["excess_percent"] == pytest.approx(100 * (1 - saved), abs=1e-3)
     assert 0 == off["optimised"] < off["network"] < 0.6 * off["rigid"]
+
+
+def test_with_renewed_bodies_what_was_deepest_in_the_old_ones_is_forgotten(monkeypatch):
+    rig, _ = with_balls()
+    rig = replace(rig, points=rig.points - [0, 0.2, 0])  # in the chest
+    held, read, renewed = HairOnBodies(rig, RigMaterial(), 32, np.random.default_rng(0), rig_spec()), [], []
+    monkeypatch.setattr(held.pool, "renew", lambda count: renewed.append(len(read)) or np.arange(count))
+    turns = torch.as_tensor(np.tile(no_turns(rig), (8, 1, 1)), dtype=torch.float32)
+    for _ in range(EVERY):
+        held.parts(lambda features: read.append(features.numpy()) or turns, 8)
+    assert renewed == [EVERY - 1]
+    bodies, features, _ = held._hard
+    again = [(read[-1] == row).all(axis=1).any() for row in features[bodies < RENEWED]]
+    assert len(bodies) > 40 and all(again)
+
+
+def test_hair_learns_to_keep_more_than_its_margin_from_the_body(monkeypatch):
+    """Networks are not exact to the millimetre."""
+    margins = []
+
+    def kept(rig, material, *given):
+        margins.append(material.margin)
+        if len(margins) in (1, 5):
+            raise KeyboardInterrupt  # now all is known
+        return SimpleNamespace(pool=SimpleNamespace(collides=True))
+
+    for name in ("HairOnBodies", "DeepestPoses"):
+        monkeypatch.setattr(rig_dynamic, name, kept)
+    monkeypatch.setattr(rig_static, "HairOnBodies", kept)
+    for train, options in ((train_static, {}), (train_dynamic, {"clips": 1, "clip_seconds": 0.2})):
+        with pytest.raises(KeyboardInterrupt):
+            train(with_balls()[0], steps=1, report_poses=0, **options)
+    assert len(margins) == 5 and min(margins) > RigMaterial().margin + 0.005
 
 
 def test_a_report_measures_a_few_poses_at_a_time_each_with_its_own_body(monkeypatch):

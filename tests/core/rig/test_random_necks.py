@@ -14,7 +14,8 @@ from neuralocks_core.motion import Clip
 from neuralocks_core.rig import RigSampler, find_chains, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
-from neuralocks_core.training.rig.poses import Moments, PosePool, _random_skinning
+from neuralocks_core.training.rig.body import BodyPatch
+from neuralocks_core.training.rig.poses import RANGE, Moments, PosePool, _random_skinning
 from tests.core.rig.builders import character, tail, with_balls
 
 
@@ -60,6 +61,9 @@ def test_necks_do_what_necks_can_and_arms_hang(rig):
         for row in (rig.character.head, joint(rig, "neck"))
     )
     assert nods == pytest.approx([64, 86, 48], abs=6) and (necks < 0.75 * nods).all() and (necks > 0.4 * nods).all()
+    turns = Rotation.from_matrix(facing @ skinning[:, rig.character.head, :3, :3] @ facing.T).as_rotvec()
+    far = np.linalg.norm(turns / RANGE, axis=1) / 1.1  # evenly in an ellipsoid
+    assert np.percentile(far, [20, 50, 80]) == pytest.approx(np.cbrt([0.2, 0.5, 0.8]), abs=0.04)
     for side, sign in (("left", 1), ("right", -1)):
         elbow, shoulder = (skeleton.bind[joint(rig, f"{side}_{part}_arm"), :, 3] for part in ("lower", "upper"))
         arm = (skinning[:, joint(rig, f"{side}_upper_arm")] @ (elbow - shoulder))[:, :3] @ facing.T
@@ -94,3 +98,17 @@ def test_bodies_have_shapes_and_hair_meets_them():
     assert 0 < chest.sum() < len(chest) and np.ptp(pools[1].shapes) > 0.2
     normals, offsets = pools[1].planes(np.arange(4), shaped)
     assert np.abs(np.einsum("nvi,nvi->nv", normals, shaped) - offsets).max() < 1e-3
+
+
+def test_other_bodies_vary_the_less_the_more_a_place_follows_the_head():
+    """As on a neck; and relative to the head, which a shape may move as a whole."""
+    rig, _ = with_balls()
+    body, head = rig.character.body, rig.character.head
+    on_head = np.where(body.joint_indices[:, 0] == head, 1.0, 0.25)
+    weights = np.stack([on_head, 1 - on_head], axis=1)
+    joints = np.tile([head, body.joint_indices[-1, 0]], (len(weights), 1))
+    shape = np.where(on_head[:, None] == 1, [0.01, 0, 0], [0, 0, 0.05])
+    body = replace(body, joint_indices=joints, joint_weights=weights, shapes={"wide": shape})
+    patch = BodyPatch.of(replace(rig, character=replace(rig.character, body=body)), 100)
+    moved = np.unique(patch.body.shapes["wide"].round(9), axis=0)
+    np.testing.assert_allclose(moved, [[-0.0075, 0, 0.0375], [0, 0, 0]], atol=1e-9)

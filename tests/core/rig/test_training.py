@@ -20,7 +20,7 @@ from neuralocks_core.training.rig import dynamic as rig_dynamic
 from neuralocks_core.training.rig import report as rig_report
 from neuralocks_core.training.rig.dynamic import train_dynamic
 from neuralocks_core.training.rig.energy import RigEnergy, bounded_turns
-from neuralocks_core.training.rig.motion import SPRINGS, motion_report
+from neuralocks_core.training.rig.motion import DEFAULTS, SPRINGS, motion_report
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.poses import PosePool
 from neuralocks_core.training.rig.static import train_static
@@ -182,6 +182,10 @@ def test_progress_goes_on_through_the_report(monkeypatch):
         shares = [done / total for done, total, _ in told]
         assert shares == sorted(shares) and shares[-1] > 0.95
         assert len([message for done, _, message in told if done >= 600]) >= 3 and model.report
+    inside = model.report["motion_depth"]  # every eighth sample of four seconds
+    assert {name: found["poses"] for name, found in inside.items()} == dict.fromkeys(
+        ("simulation", SPRINGS, DEFAULTS, "dynamic network"), 16
+    )
     # Half a minute of training would else seem to take half an hour once the bodies are posed.
     at = {message.split()[0]: share for share, (*_, message) in reversed(list(zip(shares, told)))}
     assert at["error"] - at["posing"] > 0.1
