@@ -6,12 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="training needs torch")
+torch = pytest.importorskip("torch", reason="training needs torch")
 
 from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.network_sizes import K
 from neuralocks_core.training import gauge
 from neuralocks_core.training.farm import Rollout
+from neuralocks_core.training.regression import predicted
 
 HISTORY, FIRST, STEP = slice(2, 4), 5, 2.0**-12
 LENGTH = np.array([0.2, 0.4, 0.3], np.float32)
@@ -67,6 +68,35 @@ def test_an_answer_of_a_part_of_the_motion_is_wrong_by_the_rest(monkeypatch):
     }
     assert {name: getattr(found, name) for name in expected} == pytest.approx(expected, rel=1e-3)
     assert all(vector.all() for rollout in rollouts for vector in rollout.vectors), "the bank's own stay"
+
+
+class Telling(torch.nn.Linear):
+    """A network whose hair moves by the product of an entry of the frame's vector, the material's first number, and the strand's own."""
+
+    def strand_part(self, strands):
+        return strands
+
+    def frame_part(self, frames):
+        return frames
+
+    def tail(self, strands, frames):
+        return (frames[..., :1] * frames[..., 1:2] * strands).expand(-1, -1, 3 * K)
+
+
+@pytest.mark.parametrize("anchored", [False, True])
+def test_the_network_is_asked_for_each_strand_in_its_material_and_in_every_frame(anchored):
+    rollout, rng = swung(0, frames=3), np.random.default_rng(0)
+    rollout.materials[:, 0], rollout.bind[0] = [5.0, -7.0], 0.5
+    rollout.vectors[:, 0] = rng.normal(size=3)
+    own = rng.normal(size=(4, 1)).astype(np.float32)
+    bank = SimpleNamespace(inputs=[own], material=slice(1, 5))
+    found = predicted(Telling(1, 1), bank, rollout, "displacement", anchored)
+    frame = rollout.vectors[:, 0] - (0.5 if anchored else 0.0)
+    wanted = frame[:, None] * np.array([5.0, -7.0]) * own[rollout.strands, 0]
+    assert not found[:, :, :2].any() and (rollout.vectors[:, 1:] == 1).all(), "the rollout's own stay"
+    np.testing.assert_allclose(
+        found[:, :, 2:], np.broadcast_to(wanted[..., None, None], found[:, :, 2:].shape), rtol=1e-5
+    )
 
 
 def test_hair_counts_as_inside_where_it_is_deeper_than_the_solvers_by_a_millimetre(monkeypatch):

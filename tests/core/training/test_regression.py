@@ -8,7 +8,7 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 
 from neuralocks_core.materials import MARGIN
 from neuralocks_core.network_sizes import STRAND, K
-from neuralocks_core.training.regression_losses import regression_losses
+from neuralocks_core.training.regression_losses import CREEP, STILL, TOGETHER, regression_losses
 from neuralocks_core.training.regression_options import RegressionOptions
 
 EDGE, KINK = 0.01, 0.6
@@ -109,6 +109,17 @@ def test_each_loss_counts_by_its_own_weight():
     plain, weighed = (losses(0.5 * moved, moved, (0.0, 1.0, 0.0, 0.01), **each) for each in ({}, weights))
     assert min(plain.values()) > 1e-3
     assert weighed == pytest.approx({name: weights[name] * plain[name] for name in WEIGHTS})
+
+
+def test_what_hardly_moves_or_parts_is_measured_by_its_length():
+    """The solver's hair stands still in one lock, the answer does not."""
+    answer = 0.1 * swinging()
+    found = losses(answer, 0 * answer)
+    about = (answer - answer.mean(1, keepdim=True)).square().sum(-1).mean((1, 3)).sqrt().mean().item()
+    steps = (answer[:, 1::2] - answer[:, ::2]).square().sum(-1).mean(-1).sqrt().mean().item()
+    apart = (answer - answer.mean(2, keepdim=True)).square().sum(-1).mean().sqrt().item()
+    for name, far, least in (("swing", about, STILL), ("settling", steps, CREEP), ("parting", apart, TOGETHER)):
+        assert found[name] == pytest.approx(far / (least * LENGTH), rel=1e-3), name
 
 
 def test_each_ratio_leaves_out_what_the_others_measure():

@@ -67,7 +67,8 @@ def test_another_history_reads_the_same_simulation(scene):
     rollout = maker.make(6)
     assert np.array_equal(maker.reread(6, rollout, scene.spec).vectors, rollout.vectors)
     spec = BoundarySpec(bins=(1,) * 30)
-    assert maker.reread(6, rollout, spec).vectors.shape == (60, spec.size)
+    again = maker.reread(6, rollout, spec)
+    assert again.vectors.shape == (60, spec.size) and again.bind.shape == (spec.size,)
 
 
 def test_a_groom_that_cannot_be_learned_from_is_refused_before_anything_is_simulated(scene, in_one_process, tmp_path):
