@@ -58,6 +58,7 @@ def test_tails_that_hang_from_the_neck_are_no_head():
     for outline in (
         "hips\n neck\n  tailL\n   tailL2\n  pony\n   pony2\n  Kopf",
         "hips\n neck\n  Kopf\n  pony\n   pony2\n  tailL",
+        "hips\n neck\n  headband\n  Kopf",
     ):
         paths, parents = rig(outline)
         heights = {"hips": 1.0, "neck": 1.45, "Kopf": 1.55}

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from neuralocks_core.animation.retarget import retarget
+from neuralocks_core.animation.retarget import _trunk_between, retarget
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.formats.bvh import read_bvh
 from neuralocks_core.rotation import angle_between, from_vector
 from tests.core.animation.written_bvh import NAMINGS, Z_UP, along_x, along_x_mirrored, write_bvh
+from tests.core.rig.builders import character
 from tests.shared_data import SHARED
 
 REAL = SHARED / "motion"
@@ -227,3 +228,15 @@ def test_without_toes_ankles_tell_where_the_floor_is(tmp_path):
     who = Character(read_bvh(write_bvh(tmp_path / "stands.bvh", [{}])).skeleton)
     assert not set(who.skeleton.parents) & {who.humanoid[f"{side}_foot"] for side in ("left", "right")}
     np.testing.assert_allclose(retarget(motion, who).joints[1], who.skeleton.bind, atol=1e-9)
+
+
+def test_joints_that_the_take_lacks_follow_or_turn_half_way(tmp_path):
+    """A tail follows its hips; in a trunk, each joint lies between those that turn, the lower one first."""
+    who = character([("tail", "hips", (0, 1, -0.2))])
+    clip = retarget(read_bvh(write_bvh(tmp_path / "take.bvh", [{}, POSE])), who)
+    turns = who.relative_rotations(clip.joints, [who.humanoid["hips"], len(who.skeleton.names) - 1])
+    assert np.allclose(turns[1, 0], turned(*POSE["hips"])) and np.allclose(turns[:, 1], turns[:, 0])
+    nods = {"hips": 0.0, "upper_chest": 0.4, "head": 0.8}
+    found = _trunk_between({name: from_vector(np.array([[nod, 0, 0]])) for name, nod in nods.items()})
+    for name, nod in (nods | {"spine": 0.2, "chest": 0.3, "neck": 0.6}).items():
+        np.testing.assert_allclose(found[name], from_vector(np.array([[nod, 0, 0]])), atol=1e-12)

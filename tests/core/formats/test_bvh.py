@@ -220,3 +220,21 @@ def test_real_files_are_people():
 def test_a_leading_t_pose_is_dropped():
     assert len(read_bvh(REAL / "01_01.bvh").clip.times) == 2751
     assert len(read_bvh(REAL / "02_01.bvh").clip.times) == 343
+
+
+def test_a_person_in_an_unusual_unit_is_as_tall_as_people(tmp_path):
+    """Half-metres, of which no file in use is made."""
+    lengths = {"0 80 0": "0 1.6 0", "0 20 0": "0 0.4 0", "0 -90 0": "0 -1.8 0"}
+    text = TEXT
+    for usual, other in lengths.items():
+        text = text.replace(f"OFFSET {usual}", f"OFFSET {other}")
+    motion = read_bvh(written(tmp_path, text))
+    assert motion.unit == pytest.approx(1.7 / 3.8) and motion.skeleton.bind[1, 1, 3] == pytest.approx(1.6 * 1.7 / 3.8)
+
+
+@pytest.mark.parametrize("angles, kept", [((0, 70, 75, 80, 85), 4), ((0, 30, 60, 90, 120), 5), ((0, 8, 9, 10, 11), 5)])
+def test_a_first_frame_is_dropped_from_which_the_motion_leaps(tmp_path, angles, kept):
+    """Not if it goes on as fast, or hardly leaves it."""
+    frames = "".join(f"0 90 0  {angle} 0 0  0 0 0  0 0 0\n" for angle in angles)
+    motion = read_bvh(written(tmp_path, TEXT.partition("Frames")[0] + "Frames: 5\nFrame Time: 0.04\n" + frames))
+    assert len(motion.clip.times) == kept and motion.clip.times[0] == 0
