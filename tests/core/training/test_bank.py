@@ -62,6 +62,9 @@ def test_a_step_sees_hairs_of_one_material_as_they_are_or_in_a_mirror(scene):
         np.testing.assert_array_equal(plain["strands"], strand_inputs(hair, codes)[chosen])
         np.testing.assert_array_equal(other["strands"], strand_inputs(mirrored_strands(hair), seen)[chosen])
         np.testing.assert_array_equal(plain["length"], hair.length[chosen])
+    options = RegressionOptions(clips=80, moments=1, strands=1, mirror=0.4)
+    some = bank.batch(np.random.default_rng(0), options)["strands"].numpy()
+    assert 18 <= sum((each != strand_inputs(hair, codes)).any(axis=1).all() for each in some) <= 46
 
 
 def alike(vector, other, spec):
