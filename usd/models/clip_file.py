@@ -63,7 +63,7 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None, b
     read = [read_each_rig(stage, alike, border, names[character.head], all_shapes=True) for border in borders]
     rigs, errors = min(read, key=lambda each: min((_apart(character, rig).max() for rig in each[0]), default=np.inf))
     if not rigs:
-        raise errors[0]
+        raise NeuralocksError(f"{path}: {errors[0]}")
     moving = [rig for rig in rigs if len(rig.clip.times) > 1]
     if not moving:
         raise NeuralocksError(f"{path}: its skeleton has no animation; give a moving one")
@@ -73,7 +73,7 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None, b
             f"{moving[1].path}; give each a file of its own"
         )
     if stops := without_turn(moving[0]):
-        raise NeuralocksError(stops[0])
+        raise NeuralocksError(f"{path}: {stops[0]}")
     return _on(character, moving[0], Path(path), notes)
 
 
