@@ -90,8 +90,6 @@ def training_scene(
     weights = check_weights(gestures or {})
     rigs = read_rigs(character, skeleton, head, joints)
     rig = rigs[0]
-    if "head" not in rig.character.humanoid:
-        raise NeuralocksError(f"{rig.path}: no joint is named like a head; name it with --head JOINT")
     notes = [*first_of(rigs), *rig.notes, *unfound(rig), *unlikely_head(rig)]
     found: list[StrandSet] = []
     if styles := [style for style in STYLES if style in grooms or LIBRARY in grooms]:
