@@ -174,10 +174,7 @@ def _rest_channels(source: JointSource, order: list[str]) -> dict:
 
 def _joined(attribute, code, rest: list) -> list:
     """The animation's own values, bit for bit, and those at rest for what was appended."""
-    values = attribute.Get(code) if attribute and attribute.HasValue() else None
-    if values is None and attribute and attribute.HasValue():
-        values = attribute.Get(Usd.TimeCode.EarliestTime())
-    values = list(values) if values is not None else []
+    values = list((attribute.Get(code) if attribute else None) or ())
     return values + rest[len(values) :]
 
 

@@ -31,12 +31,15 @@ def test_what_no_bake_can_use_is_refused_and_nothing_is_written(tmp_path, option
 
 
 def test_all_notes_are_told_those_known_before_hair_is_turned_first(tmp_path):
+    """And how many samples are done."""
     for folder in ("layout", "cache"):
         (tmp_path / folder).mkdir()
     model, told = model_for(read_rigged_hair(small_shot(tmp_path / "who.usda"))), []
     (tmp_path / "layout" / "set.usda").write_text('#usda 1.0\ndef "Who" (references = @who.usda@</Who>)\n{\n}\n')
     shot = tmp_path / "shot.usda"
     shot.write_text("#usda 1.0\n(\n  metersPerUnit = 1\n  subLayers = [@./layout/set.usda@]\n)\n")
-    result = bake_rig(shot, tmp_path / "cache" / "hair.usda", model, tell=told.append)
+    out, done = tmp_path / "cache" / "hair.usda", []
+    result = bake_rig(shot, out, model, tell=told.append, progress=lambda *each: done.append(each))
     first, late = told
     assert first and any("SEARCH_PATH" in note for note in late) and result.notes == first + late
+    assert done == [(number, 25, "hair joints") for number in range(1, 26)]
