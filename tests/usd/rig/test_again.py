@@ -110,6 +110,18 @@ def test_a_bake_of_other_hair_keeps_that_of_the_one_before(folder):
     assert {name.rsplit("/", 1)[1] for name in baked.GetAttribute(HAIR).Get()} == {"hair_0", "hair_1", "hair_2"}
 
 
+def test_hair_that_stays_keeps_samples_that_nothing_else_has(folder):
+    """Those between frames, of a bake with subframes: hair would else go straight from frame to frame."""
+    stage = Usd.Stage.Open(str(folder / "hair.usda"))
+    rotations = stage.GetPrimAtPath(f"/Who/Rig/{BAKED}").GetAttribute("rotations")
+    rotations.Set([Gf.Quatf(0.6, 0.8, 0, 0)] * 6, 7.5)
+    stage.GetRootLayer().Save()
+    other = model_for(read_rigged_hair(folder / "shot.usda", chains=["hair_1"]))
+    bake_rig(folder / "hair.usda", folder / "both.usda", other)
+    first, both = (hair_turns(folder / f"{name}.usda", [7, 7.5, 8])[:, 0] for name in ("hair", "both"))
+    np.testing.assert_array_equal(both, first)
+
+
 def test_hair_that_stays_as_the_animation_was_is_named_until_it_is_baked_again(folder):
     first, second = (model_for(read_rigged_hair(folder / "shot.usda", chains=[name])) for name in ("hair_0", "hair_1"))
     bake_rig(folder / "shot.usda", folder / "hair.usda", first)
