@@ -38,12 +38,12 @@ def reference_end(clip: Clip, character: Character, poses: list[np.ndarray]) -> 
         # Most clips begin otherwise, and no more of them is looked at.
         body = _readable_body(character, np.stack([pose, near[0]]))
         wanted = _turns(character, body, pose)
-        if not len(body) or _farthest(_turns(character, body, near[0]), wanted) > SAME:
+        if not len(body) or angle_between(_turns(character, body, near[0]), wanted).max() > SAME:
             continue
         body = _readable_body(character, np.concatenate([pose[None], near]))
         wanted = _turns(character, body, pose)
-        shown = [_farthest(_turns(character, body, each), wanted) <= SAME for each in near]
-        count = shown.index(False) if False in shown else len(near)
+        turned = angle_between(_turns(character, body, near), wanted).max(axis=-1, initial=0.0)
+        count = int(np.append(turned > SAME, True).argmax())
         if count + 1 < len(near) and _leaps(clip, character, body, count):
             stepped = Stepped.of(clip, joints_read(character)).held
             return None if len(stepped) else float(clip.times[count])
@@ -86,7 +86,3 @@ def _turns(character: Character, body: np.ndarray, joints: np.ndarray) -> np.nda
         rotation_part(joints[..., each, :, :], "animation") for each in (body, character.skeleton.parents[body])
     )
     return np.swapaxes(above, -1, -2) @ own
-
-
-def _farthest(first: np.ndarray, second: np.ndarray) -> float:
-    return float(angle_between(first, second).max(initial=0.0))

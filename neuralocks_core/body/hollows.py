@@ -29,10 +29,13 @@ def filled(value: np.ndarray, cell: float) -> np.ndarray:
     if not rim.any():
         return value
     # The outside is all balls around free nodes that touch the skin; in most places, one ball is enough.
-    nodes = np.argwhere(rim)
-    asked = ~outside
-    far, which = cKDTree(cell * nodes).query(cell * np.argwhere(asked), k=np.arange(1, min(NEIGHBOURS, len(nodes)) + 1))
-    depth = (far - value[rim][which]).min(axis=1) - CREASE
+    nodes, asked = np.argwhere(rim), np.argwhere(~outside)
+    nearest = ndimage.distance_transform_edt(~rim, return_distances=False, return_indices=True)[(slice(None), *asked.T)]
+    depth = cell * np.linalg.norm(asked - nearest.T, axis=1) - value[tuple(nearest)] - CREASE
+    asked = asked[-depth < value[~outside]]  # the others stay as they are: the best ball is no farther than this one
     result = value.copy()
-    result[asked] = np.minimum(value[asked], -depth)
+    if len(asked):
+        far, which = cKDTree(cell * nodes).query(cell * asked, k=np.arange(1, min(NEIGHBOURS, len(nodes)) + 1))
+        depth = (far - value[rim][which]).min(axis=1) - CREASE
+        result[tuple(asked.T)] = np.minimum(value[tuple(asked.T)], -depth)
     return result

@@ -3,8 +3,9 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
-from neuralocks_core.body.hollows import filled
+from neuralocks_core.body.hollows import BALL, CREASE, NEIGHBOURS, filled
 
 CELL = 0.005
 PLACES = CELL * np.stack(np.meshgrid(*[np.arange(-30, 31)] * 3, indexing="ij"), axis=-1)
@@ -42,3 +43,18 @@ def test_an_open_dent_and_a_solid_head_stay_as_they_are():
 def test_a_grid_without_any_outside_stays():
     deep = np.full((4, 4, 4), -0.05)
     np.testing.assert_array_equal(filled(deep, CELL), deep)
+
+
+def test_every_node_is_as_deep_as_the_balls_that_touch_the_skin_leave_it():
+    """Also those that are left out of the search because a ball nearby shows that nothing becomes of it."""
+    skin = ball(0.1)
+    head = np.maximum(skin, -ball(0.03, (0, 0, 0.04)))
+    outside = skin >= BALL
+    rim = np.argwhere(outside & ~ndimage.binary_erosion(outside, np.ones((3, 3, 3)), border_value=1))
+    asked = np.random.default_rng(0).choice(np.argwhere(~outside), 200, replace=False)
+    away = CELL * np.linalg.norm(asked[:, None] - rim, axis=-1)
+    near = np.argsort(away, axis=1)[:, :NEIGHBOURS]
+    depth = (np.take_along_axis(away, near, axis=1) - head[tuple(rim.T)][near]).min(axis=1) - CREASE
+    found, before = filled(head, CELL)[tuple(asked.T)], head[tuple(asked.T)]
+    assert 0 < (found < before).mean() < 0.5
+    np.testing.assert_allclose(found, np.minimum(before, -depth), atol=2e-4)  # of nodes equally far, some are taken
