@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small shots for tests: one humanoid with a head of hair, written in any unit, up axis and nesting; bakes read back."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -56,8 +56,22 @@ class Recipe:
 
 
 def write_shot(folder: Path, recipe: Recipe = Recipe(), name: str = "shot") -> Path:
-    """Write the shot; returns its path."""
+    """Write the shot; returns its path. Of each recipe, USD writes one file, and the others are copies."""
     path = Path(folder) / f"{name}.{recipe.extension}"
+    made = replace(recipe, place=None), None if recipe.place is None else recipe.place.tobytes()
+    if made in _WRITTEN:
+        path.parent.mkdir(parents=True, exist_ok=True)  # as USD does
+        path.write_bytes(_WRITTEN[made])
+    else:
+        _write(path, recipe)
+        _WRITTEN[made] = path.read_bytes()
+    return path
+
+
+_WRITTEN: dict[tuple, bytes] = {}
+
+
+def _write(path: Path, recipe: Recipe) -> None:
     stage = Usd.Stage.CreateNew(str(path))
     to_stage = np.eye(4)
     if recipe.up == "Z":
@@ -83,7 +97,6 @@ def write_shot(folder: Path, recipe: Recipe = Recipe(), name: str = "shot") -> P
         _skin(stage, root, to_stage, skeleton)
     _groom(stage, root, to_stage, skeleton, recipe)
     stage.GetRootLayer().Save()
-    return path
 
 
 def edited(folder: Path, edit, recipe: Recipe = Recipe()) -> Path:
