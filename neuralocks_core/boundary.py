@@ -181,9 +181,9 @@ class BoundarySampler:
         elif spec.linear == "velocity":
             velocity = (position[:, :-2] - position[:, 1:-1]) / spec.dt
             columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, velocity), self.SPEED_LIMIT))
-        for joint in (0, 1)[: 1 + spec.chest]:
-            step = turns[:, :-2, joint] @ np.swapaxes(turns[:, 1:-1, joint], -1, -2)
-            spin = rotation.to_vector(step) / spec.dt
+        both = slice(1 + spec.chest)  # head and upper chest
+        spins = rotation.to_vector(turns[:, :-2, both] @ np.swapaxes(turns[:, 1:-1, both], -1, -2)) / spec.dt
+        for spin in np.moveaxis(spins, 2, 0):
             columns.append(_limited(np.einsum("nkij,nkj->nki", to_head, spin), self.SPIN_LIMIT))
         return self._binned(np.concatenate(columns, axis=-1))
 

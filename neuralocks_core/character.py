@@ -208,8 +208,15 @@ class Character:
     def relative_rotations(self, joints: np.ndarray, indices) -> np.ndarray:
         """World rotations (..., n, 3, 3) of the joints from the bind pose, in axes that face +Z there."""
         now = rotation_part(np.asarray(joints, float)[..., indices, :, :], "animation")
-        bind = rotation_part(self.skeleton.bind[indices], "bind pose")
-        return now @ np.swapaxes(bind, -1, -2) @ self.facing.T
+        asked = tuple(indices)
+        if asked not in self._bind_turns:
+            self._bind_turns[asked] = rotation_part(self.skeleton.bind[indices], "bind pose")
+        return now @ np.swapaxes(self._bind_turns[asked], -1, -2) @ self.facing.T
+
+    @cached_property
+    def _bind_turns(self) -> dict[tuple, np.ndarray]:
+        """Rotations (n, 3, 3) in the bind pose of the joints (n,) that were asked for: each frame asks for the same."""
+        return {}
 
     def posed_body(self, joints: np.ndarray, shape: np.ndarray | None = None) -> np.ndarray | None:
         """World points (V, 3) of the body for one pose, joints (J, 4, 4)."""
