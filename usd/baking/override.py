@@ -16,7 +16,7 @@ from ..border.stage_files import refresh_open
 from ..border.stopping import check
 from ..shot.curves import rest_points, widest_sample
 from ..shot.made_from import INPUTS, made_from
-from ..shot.recorded import record
+from ..shot.recorded import CARRIER, record
 from ..shot.stage import Shot, StageGroom
 from ..skel.binding import FORMER, bound_skeleton
 from .header import apply_binding, over_prim, write_header
@@ -52,15 +52,14 @@ class OverrideWriter:
         if layer.GetAttributeAtPath(path.AppendProperty("points")):
             return  # done by the bake that this one resumes
         over = over_prim(layer, item.prim)
-        carried = {"skeleton": item.attachment.rig.path, "joint": item.joint}
-        record(over, {**facts, **carried, INPUTS: made_from(item.attachment, item.groom)})
+        record(over, {**facts, "joint": item.joint, INPUTS: made_from(item.attachment, item.groom)})
+        _relate(over, CARRIER, item.attachment.rig.path)
         if skeleton := bound_skeleton(item.prim):  # perhaps of another character than the one that carries it
             # An explicit empty target list unbinds the prim; UsdSkel then leaves its points alone.
             apply_binding(over, item.prim)
             relation = Sdf.RelationshipSpec(over, "skel:skeleton", custom=False)
             relation.targetPathList.ClearEditsAndMakeExplicit()
-            former = Sdf.RelationshipSpec(over, FORMER, custom=True)
-            former.targetPathList.explicitItems = [skeleton]
+            _relate(over, FORMER, skeleton)
         names = Sdf.ValueTypeNames
         Sdf.AttributeSpec(over, "extent", names.Float3Array)
         points = Sdf.AttributeSpec(over, "points", names.Point3fArray)
@@ -124,6 +123,11 @@ class _Writable:
         self._array = array  # lives as long as numpy's view of this
         facts = np.asarray(array).__array_interface__
         self.__array_interface__ = {**facts, "data": (facts["data"][0], False)}
+
+
+def _relate(over: Sdf.PrimSpec, name: str, path: str) -> None:
+    """Point from a groom to another prim."""
+    Sdf.RelationshipSpec(over, name, custom=True).targetPathList.explicitItems = [path]
 
 
 def _corners(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

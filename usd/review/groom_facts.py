@@ -78,7 +78,7 @@ def _groom(
             if found is None:
                 return None
             to_bind, drawn = found.to_bind, found.drawn
-            joint = {"joint": rig_joint(found), "carried by": found.how}
+            joint = {"skeleton": found.rig.path, "joint": rig_joint(found), "carried by": found.how}
         except NeuralocksError as error:
             stops.append(str(error))
     else:

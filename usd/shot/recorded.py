@@ -12,6 +12,10 @@ from ..border.units import Border
 
 KEY = "neuralocks"
 """In a groom's customData; it is composed with the points, through whatever layers come on top."""
+CARRIER = "neuralocks:carrier"
+"""A relationship to the skeleton that carried a groom in its bake: unlike a path in its customData, it goes where references, copies
+and flattening take the two.
+"""
 
 
 def record(over: Sdf.PrimSpec, facts: dict) -> None:
@@ -86,11 +90,10 @@ def recorded_joint(prim: Usd.Prim) -> str | None:
 
 
 def recorded_skeleton(prim: Usd.Prim) -> str | None:
-    """Path of the skeleton that carried a groom in its bake; None if it is not recorded, or the bake was made in another stage, where
-    paths are others.
-    """
-    told = recorded(prim).get("skeleton")
-    return told if isinstance(told, str) and in_stage(prim) else None
+    """Path of the skeleton that carried a groom in its bake; None if it is not recorded, or not here."""
+    carrier = prim.GetRelationship(CARRIER)
+    told = carrier.GetTargets() if carrier else []
+    return str(told[0]) if len(told) == 1 else None
 
 
 def recorded_volume(prim: Usd.Prim) -> float:

@@ -7,6 +7,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
 from usd.baking.bake import bake
 from usd.border.stage_files import open_stage
+from usd.shot.recorded import CARRIER
 from usd.skel.binding import FORMER
 
 from ..shots import HEAD, Recipe, samples, strand_points, world_points, write_shot
@@ -24,7 +25,7 @@ def test_the_layer_holds_samples_and_nothing_else(baked):
     layer = Sdf.Layer.FindOrOpen(str(result.path))
     assert list(layer.subLayerPaths) == ["./shot.usda"]
     hair = layer.GetPrimAtPath("/Hero/Hair")
-    assert set(hair.properties.keys()) == {"points", "velocities", "extent", "skel:skeleton", FORMER}
+    assert set(hair.properties.keys()) == {"points", "velocities", "extent", "skel:skeleton", FORMER, CARRIER}
     assert all(p.specifier == Sdf.SpecifierOver for p in (hair, layer.GetPrimAtPath("/Hero")))
     assert all(hair.attributes[n].default is None for n in ("points", "velocities", "extent"))
     assert layer.ListTimeSamplesForPath("/Hero/Hair.points") == [float(t) for t in range(1, 10)]

@@ -158,6 +158,33 @@ def test_hair_that_another_character_carries_than_it_is_bound_to_is_not_skinned_
     assert not any("bake again" in line for line in inspect(out)["spoils"])
 
 
+@pytest.mark.parametrize("bound", ["own", "mesh", "none"])
+def test_hair_of_a_copied_bake_is_carried_by_the_copy(tmp_path, still_model, bound):
+    """Also once flattened, or within one layer, where a path that the bake has recorded would still lead to the first."""
+    baked = bake(write_shot(tmp_path, Recipe(bound=bound)), tmp_path / "hair.usda", still_model).path
+    stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    for name, x, instanceable in (("Hero", 0, False), ("Twin", 0.6, False), ("Third", 1.2, True)):
+        prim = stage.DefinePrim(f"/{name}", "SkelRoot")
+        prim.GetReferences().AddReference(str(baked), "/Hero")
+        prim.SetInstanceable(instanceable)
+        UsdGeom.XformCommonAPI(prim).SetTranslate((x, 0, 0))
+    stage.Save()
+    stage.Flatten().Export(str(tmp_path / "flat.usda"))
+    within = Usd.Stage.Open(str(baked))
+    UsdGeom.XformCommonAPI(within.DefinePrim("/Twin", "SkelRoot")).SetTranslate((0.6, 0, 0))
+    within.GetPrimAtPath("/Twin").GetReferences().AddInternalReference("/Hero")
+    within.Save()
+    for path, count in ((tmp_path / "two.usda", 3), (tmp_path / "flat.usda", 3), (baked, 2)):
+        shot = read_baked(path).shot
+        carriers = [(item.path.rpartition("/")[0], item.attachment.rig.path) for item in shot.grooms]
+        assert len(carriers) == count and all(rig == f"{root}/Rig" for root, rig in carriers)
+        assert not any("bake again" in note for note in shot.notes)
+        assert [(each["path"], each["skeleton"]) for each in inspect(path)["grooms"]] == [
+            (f"{root}/Hair", rig) for root, rig in carriers
+        ]
+
+
 @pytest.mark.parametrize("bound", ["mesh", "none"])
 def test_a_moving_cache_gets_its_shape_at_rest_in_its_own_space(tmp_path, still_model, bound):
     """In centimetres, Z up, for a turned and moved character: the transforms of the points do not commute."""
