@@ -36,7 +36,7 @@ class HairSearch:
         named: the user named these curves: none is left out because it is empty or far away.
         others: skeletons whose hair is not wanted; None if there are none.
         forced: the user named the skeleton for these curves: a binding to another does not count.
-        as_baked: curves that were baked are carried by the skeleton that carried them then.
+        as_baked: curves that were baked are hair, wherever they lie, and carried by the skeleton that carried them then.
 
     Attributes:
         rigs: as given.
@@ -112,8 +112,9 @@ class HairSearch:
         self._copied += copied.values()
         curves = [prim for prim in curves if prim not in copied]
         if not self._named:
-            self._controls += [str(prim.GetPath()) for prim in curves if is_closed(prim)]
-            curves = [prim for prim in curves if not is_closed(prim)]
+            closed = {prim: str(prim.GetPath()) for prim in curves if is_closed(prim) and not self._baked_with(prim)}
+            self._controls += closed.values()
+            curves = [prim for prim in curves if prim not in closed]
         empty = [] if self._named else without_points(curves)
         self._notes += few([no_points(str(prim.GetPath())) for prim in empty])
         return [prim for prim in curves if prim not in empty]
@@ -135,16 +136,15 @@ class HairSearch:
             return None
 
     def _attachment(self, prim: Usd.Prim, placement: Placement) -> Attachment | None:
-        path, rigs = str(prim.GetPath()), self._baked_with(prim)
-        if not rigs:
-            if self._left_out(prim, placement):
-                return None
-            rigs = self.rigs
-        if not self._named and is_lone_guide(prim, self.rigs, placement):
+        path, baked = str(prim.GetPath()), self._baked_with(prim)
+        if not baked and self._left_out(prim, placement):
+            return None
+        named = self._named or bool(baked)
+        if not named and is_lone_guide(prim, self.rigs, placement):
             self._controls.append(path)
             return None
-        found = attach(prim, rigs, placement, self._head, self._notes)
-        if found.far and not self._named:
+        found = attach(prim, baked or self.rigs, placement, self._head, self._notes)
+        if found.far and not named:
             self._far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []

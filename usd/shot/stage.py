@@ -126,7 +126,7 @@ def read_shot(
         cuts: time codes at which every character is suddenly elsewhere and its hair starts anew, or a dictionary of them by
             skeleton path; detected if None.
         still: also read the hair of characters without an animation.
-        as_baked: hair that was baked is carried by the skeleton that carried it then, if it is among those wanted.
+        as_baked: hair that was baked is that of the skeleton that carried it then, if that is among those wanted.
 
     Raises:
         NeuralocksError: what stops a bake, with the prim and the remedy.

@@ -6,6 +6,8 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
+from usd.baking.bake import bake
+from usd.review.baked import read_baked
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
@@ -49,6 +51,33 @@ def test_a_head_has_a_metre_of_reach(tmp_path, away, hair):
     stage.GetRootLayer().Save()
     grooms = [item.path for item in read_shot(stage.GetRootLayer().realPath).grooms]
     assert grooms == ["/Hero/Hair", "/Set/Tuft"][: 1 + hair]
+
+
+def _far(curves):
+    UsdGeom.XformCommonAPI(curves).SetTranslate((3, 0, 0))
+
+
+def _closed(curves):
+    curves.GetWrapAttr().Set("periodic")
+
+
+def _lone_guide(curves):
+    curves.CreatePurposeAttr("guide")
+
+
+@pytest.mark.parametrize("change", [_far, _closed, _lone_guide])
+def test_hair_that_was_named_for_its_bake_need_not_be_named_again(tmp_path, still_model, change):
+    stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(bound="none", basis="bspline", strands=1))))
+    change(UsdGeom.BasisCurves(stage.GetPrimAtPath("/Hero/Hair")))
+    stage.Save()
+    path = stage.GetRootLayer().realPath
+    with pytest.raises(NeuralocksError, match="/Hero/Hair.* name it with --groom"):
+        bake(path, tmp_path / "hair.usdc", still_model)
+    out = bake(path, tmp_path / "hair.usdc", still_model, grooms=["/Hero/Hair"], frames="1:3").path
+    (item,) = read_baked(out).shot.grooms
+    facts = inspect(out)
+    assert item.path == "/Hero/Hair" == facts["grooms"][0]["path"] and not facts["stops"]
+    assert not any("--groom" in note for note in [*read_baked(out).shot.notes, *facts["spoils"]])
 
 
 def test_empty_curves_stop_nothing_beside_a_groom(tmp_path):
