@@ -62,11 +62,11 @@ def test_nothing_is_felt_before_a_push(program):
 
 
 def test_after_a_reset_nothing_of_before_is_felt(program):
-    """After a few and after many pushes, to the bit, also if the clock goes on, or starts again."""
+    """After a few and after many pushes, to the bit if the clock starts again, and as nearly as its doubles allow if it goes on."""
     felt = run_c(program, moved(200, 1), COUNT)
     assert np.abs(felt[-1]).max() > 0.1
     for before in (1, 2, 300):
-        for clock in (-5.0, 0.0):
+        for clock in (0.0, 7.0):
             rows = np.concatenate([moved(before, 2) + np.eye(10)[1] * 50, moved(200, 1)])
             rows[before:, 0] += clock
             later = run_c(program, rows, COUNT)[before:]
