@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """USD files: opening them, refusing outputs that must not be overwritten, and writing them whole."""
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -27,7 +28,7 @@ def open_stage(path) -> Usd.Stage:
     """Open a USD file.
 
     Raises:
-        NeuralocksError: it is missing, or not a readable USD file.
+        NeuralocksError: it is missing, not a readable USD file, or one of its layers has samples and no rate.
     """
     path = as_path(path, "path")
     check_file(path)
@@ -46,7 +47,19 @@ def open_stage(path) -> Usd.Stage:
         raise NeuralocksError(f"{path}: not a readable USD file ({first_line(error)}); {_remedy(path)}") from None
     if stage is None:
         raise NeuralocksError(f"{path}: not a readable USD file; {_remedy(path)}")
+    _check_rates(stage)
     return stage
+
+
+def _check_rates(stage: Usd.Stage) -> None:
+    """Refuse layers whose time samples, or those of layers in it, no stage can place in time: USD would search without end."""
+    for layer in stage.GetUsedLayers():
+        rate = layer.timeCodesPerSecond
+        if (not math.isfinite(rate) or not rate) and (
+            layer.GetCompositionAssetDependencies() or layer.ListAllTimeSamples()
+        ):
+            name = layer.GetDisplayName()
+            raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, such as 24")
 
 
 def check_file(path: Path) -> None:

@@ -50,3 +50,32 @@ def test_a_value_clip_that_is_not_open_yet_is_not_written_over(tmp_path):
                 check_not_input(path, stage)
     (tmp_path / "hair.3.usda").write_bytes(clips[0].read_bytes())
     check_not_input(tmp_path / "hair.3.usda", stage)
+
+
+@pytest.mark.parametrize("rate", [0.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("referred", [False, True])
+def test_a_layer_whose_samples_have_no_rate_is_named(tmp_path, rate, referred):
+    """USD would ask for its samples without end; what has no samples has no use for a rate."""
+
+    def shot(layer: str) -> str:
+        def author(stage: Usd.Stage) -> None:
+            stage.SetTimeCodesPerSecond(24)
+            if referred:
+                stage.DefinePrim("/Hair").GetReferences().AddReference(f"./{layer}", "/Hair")
+            else:
+                stage.GetRootLayer().subLayerPaths.append(f"./{layer}")
+
+        return write_stage(tmp_path / f"shot_{layer}", author)
+
+    for name in ("moves.usda", "stands.usda"):
+        layer = Sdf.Layer.CreateNew(str(tmp_path / name))
+        x = Sdf.AttributeSpec(Sdf.CreatePrimInLayer(layer, "/Hair"), "x", Sdf.ValueTypeNames.Float)
+        x.default = 1.0
+        if name == "moves.usda":
+            layer.SetTimeSample(x.path, 1.0, 2.0)
+        layer.timeCodesPerSecond = rate
+        layer.Save()
+    for path in (shot("moves.usda"), shot("shot_moves.usda")):
+        with pytest.raises(NeuralocksError, match=r"^moves.usda: timeCodesPerSecond is (0|nan|inf); set it to"):
+            open_stage(path)
+    assert open_stage(shot("stands.usda")).GetAttributeAtPath("/Hair.x").Get() == 1
