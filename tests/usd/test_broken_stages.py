@@ -2,7 +2,7 @@
 """Stages with something broken, or missing, are named in one line by a bake and by `inspect`; nothing is left behind."""
 
 import pytest
-from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
@@ -54,6 +54,20 @@ def renamed(stage):
     stage.GetPrimAtPath(MOTION).GetAttribute("joints").Set(paths)
 
 
+def with_shape(indices):
+    """An edit that gives the skin a blend shape of two offsets, for points of these indices."""
+
+    def edit(stage):
+        shape = UsdSkel.BlendShape.Define(stage, f"{SKIN}/smile")
+        shape.CreateOffsetsAttr([Gf.Vec3f(0.01)] * 2)
+        shape.CreatePointIndicesAttr(indices)
+        binding = UsdSkel.BindingAPI(stage.GetPrimAtPath(SKIN))
+        binding.CreateBlendShapesAttr(["smile"])
+        binding.CreateBlendShapeTargetsRel().SetTargets([shape.GetPath()])
+
+    return edit
+
+
 def assign(index, value):
     def change(array):
         array[index] = value
@@ -92,6 +106,9 @@ BROKEN = {
     "short skin": (attribute(SKIN, "primvars:skel:jointIndices", [0, 1]), SKIN, "joint indices"),
     "nan skin": (changed(SKIN, "points", assign(0, Gf.Vec3f(NAN))), SKIN, "NaN"),
     "bad face": (changed(SKIN, "faceVertexIndices", assign(0, 9999)), SKIN, "face"),
+    "few shape offsets": (with_shape([]), f"{SKIN}/smile", "2 offsets for 416 points"),
+    "more shape offsets than points": (with_shape([0]), f"{SKIN}/smile", "2 offsets and 1 point indices do not fit"),
+    "shape of no point": (with_shape([0, 416]), f"{SKIN}/smile", "do not fit 416 points"),
     "no animation": (unbound, RIG, "no animation"),
     "nan rotation": (changed(MOTION, "rotations", assign(3, Gf.Quatf(NAN)), 4), MOTION, "NaN"),
     "null rotation": (changed(MOTION, "rotations", assign(3, Gf.Quatf(0, 0, 0, 0)), 4), MOTION, "null rotation"),

@@ -97,7 +97,8 @@ def _dense(offsets: np.ndarray, chosen: np.ndarray, count: int, path) -> np.ndar
         return offsets
     if len(chosen) != len(offsets) or not 0 <= chosen.min() <= chosen.max() < count:
         raise NeuralocksError(
-            f"{path}: {len(offsets)} offsets and {len(chosen)} point indices do not fit {count} points"
+            f"{path}: {len(offsets)} offsets and {len(chosen)} point indices do not fit {count} points; export the blend shape "
+            "again"
         )
     dense = np.zeros((count, 3))
     dense[chosen] = offsets

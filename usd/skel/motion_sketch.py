@@ -2,9 +2,11 @@
 """What moves a skeleton, as a `sketch`: the same wherever a set places the character, and whatever its prims are called."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 
+from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.sketch import sketch
 
 from .joints import JointSource
@@ -31,5 +33,6 @@ def _blocks(source: JointSource, rate: float) -> Iterator[np.ndarray]:
     for first in range(0, len(codes), AT_A_TIME):
         some = codes[first : first + AT_A_TIME]
         yield source.local(some)
-        yield source.shape(names, some)
+        with suppress(NeuralocksError):  # reported when they are read for a mesh; others may be anything
+            yield source.shape(names, some)
         yield np.array([back @ source.placement.at(code) for code in some if moves])

@@ -2,7 +2,7 @@
 """A bake over another groom or animation than it was made from gets a note, and no other bake does."""
 
 import pytest
-from pxr import Gf, Sdf, Usd
+from pxr import Gf, Sdf, Usd, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
@@ -69,6 +69,21 @@ def test_one_key_that_differs_by_little_makes_another_animation(tmp_path, model)
     values[3] = values[3] * Gf.Quatf(1, 0, 1e-4, 0)
     rotations.Set(values, 5)
     stage.Save()
+    assert OLD.format("animation") in inspect(out)["spoils"]
+
+
+@pytest.mark.parametrize("weights", [[], [0.5, 0.5], [float("nan")]])
+def test_weights_of_shapes_that_no_mesh_has_may_be_anything(tmp_path, model, weights):
+    shot, out = write_shot(tmp_path), tmp_path / "hair.usdc"
+    stage = Usd.Stage.Open(str(shot))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    motion.CreateBlendShapesAttr(["smile"])
+    motion.CreateBlendShapeWeightsAttr().Set(weights, 3)
+    stage.Save()
+    assert not inspect(shot)["stops"]
+    bake(shot, out, model, frames="1:2")
+    assert not any("bake again" in note for note in inspect(out)["spoils"])
+    republish(shot, "/Hero/Rig/Motion", "rotations", turned)
     assert OLD.format("animation") in inspect(out)["spoils"]
 
 
