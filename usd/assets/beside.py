@@ -130,8 +130,9 @@ def _stays(kind: Sdf.ValueTypeName) -> str:
 
 def _varying_sizes(curves: UsdGeom.BasisCurves, points: int) -> set[int]:
     """How many varying values curves with this many points in all may have: one for each end of a segment."""
-    basis = UsdGeom.Tokens.bezier, UsdGeom.Tokens.bspline, UsdGeom.Tokens.catmullRom
-    if curves.GetTypeAttr().Get() == UsdGeom.Tokens.cubic and curves.GetBasisAttr().Get() not in basis:
+    known, basis = (UsdGeom.Tokens.bezier, UsdGeom.Tokens.bspline, UsdGeom.Tokens.catmullRom), curves.GetBasisAttr()
+    is_token = all(spec.typeName == Sdf.ValueTypeNames.Token for spec in basis.GetPropertyStack())
+    if curves.GetTypeAttr().Get() == UsdGeom.Tokens.cubic and not (is_token and basis.Get() in known):
         return {points}  # as of lines; USD would divide by zero
     sizes = {curves.ComputeVaryingDataSize(Usd.TimeCode.EarliestTime())}
     # Pinned curves are drawn through their first and last points, too; not all tools count segments there.

@@ -64,12 +64,14 @@ def test_what_an_import_leaves_out_or_takes_for_granted_is_told(tmp_path):
         assert told - said == {text for text in told if any(text.startswith(each) for each in without)}, notes
 
 
-@pytest.mark.parametrize("basis", ["hermite", "power", "b-spline"])
-def test_curves_of_an_unknown_basis_are_imported(basis, tmp_path):
+@pytest.mark.parametrize(
+    ("kind", "basis"), [("token", "hermite"), ("token", "power"), ("token", "b-spline"), ("string", "bspline")]
+)
+def test_curves_of_an_unknown_basis_are_imported(kind, basis, tmp_path):
     """USD's own count of their values divides by zero, which ended the program without a word."""
     shot = edited(tmp_path, lambda stage: stage.GetPrimAtPath("/Hero/Hair").GetAttribute("type").Set("cubic"))
     layer = Sdf.Layer.FindOrOpen(str(shot))
-    Sdf.CreatePrimAttributeInLayer(layer, "/Hero/Hair.basis", Sdf.ValueTypeNames.Token, Sdf.VariabilityUniform)
+    Sdf.CreatePrimAttributeInLayer(layer, "/Hero/Hair.basis", Sdf.ValueTypeNames.Find(kind), Sdf.VariabilityUniform)
     layer.GetAttributeAtPath("/Hero/Hair.basis").default = basis
     layer.Save()
     (groom,), _ = import_groom(shot, tmp_path / "out.usda")
