@@ -25,8 +25,11 @@ def as_numbers(attribute: Usd.Attribute, wanted: str, value, dtype=float) -> np.
     """
     shape = SHAPES[wanted]
     try:
-        found = np.asarray(() if value is None else value, dtype)
-    except (TypeError, ValueError):  # names, for example
+        with np.errstate(
+            invalid="raise", over="ignore"
+        ):  # NaN as a whole number; too large for single precision is infinite
+            found = np.asarray(() if value is None else value, dtype)
+    except (TypeError, ValueError, OverflowError, FloatingPointError):  # names, for example
         raise _unlike(attribute, wanted) from None
     if found.ndim and not len(found):
         found = np.zeros((0, *shape[1:]), dtype)

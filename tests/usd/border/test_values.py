@@ -49,6 +49,18 @@ def test_types_of_the_same_shape_are_read(made, wanted, kinds, value):
         assert as_numbers(attribute, wanted, attribute.Get()).tolist() == value
 
 
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e30])
+def test_what_is_no_whole_number_is_no_index(made, value):
+    attribute = made("double[]", [0.0, value])
+    with pytest.raises(NeuralocksError, match=r"/A: its b are double\[\], not int\[\]; export it again"):
+        as_numbers(attribute, "int[]", attribute.Get(), np.int64)
+
+
+def test_a_number_beyond_single_precision_is_infinite_there(made):
+    attribute = made("double3[]", [(0, 1e300, 0)])
+    assert as_numbers(attribute, "point3f[]", attribute.Get(), np.float32).tolist() == [[0, np.inf, 0]]
+
+
 def test_no_value_and_an_empty_one_are_no_rows(made):
     assert as_numbers(made("point3f[]", []), "point3f[]", None).shape == (0, 3)
     empty = made("token[]", [])
