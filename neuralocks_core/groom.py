@@ -186,10 +186,12 @@ class Groom:
         if len(value) == int(self.counts.sum(dtype=np.int64)):
             where += f" (strand {int(self.strand_of_point[rows[0]])})"
         if np.isfinite(first).all():
-            raise self._error(
-                f"{field} lie farther than {largest:g} {unit} from the origin, first {where}",
-                "check the unit",
+            wrong = (
+                f"lie farther than {largest:g} {unit} from the origin"
+                if value.ndim > 1
+                else f"exceed {largest:g} {unit}"
             )
+            raise self._error(f"{field} {wrong}, first {where}", "check the unit")
         raise self._error(f"{len(rows)} of {len(value)} {field} are not finite, first {where}", "repair the groom")
 
 

@@ -69,6 +69,7 @@ def test_subset_takes_everything_along():
         ),
         ({"points": np.full((5, 3), np.inf)}, "not finite"),
         ({"points": POINTS * 1e9}, "farther than 10000 m"),
+        ({"widths": np.full(POINTS.shape[0], 2e4)}, "widths exceed 10000 m"),
         ({"points": POINTS[:, :2]}, r"shape \(5, 2\)"),
         ({"points": [["a"]]}, "plain array"),
         ({"counts": [3, 3]}, "sum to 6 but there are 5"),
