@@ -217,3 +217,12 @@ def test_a_shot_that_came_without_its_layers_is_told_so(tmp_path, model, made_of
         ) as caught:
             work()
         assert "\n" not in str(caught.value)
+
+
+def test_a_shot_that_cannot_be_composed_is_not_told_to_lack_files(tmp_path, model):
+    """What it refers to is there, but has no such prim."""
+    write_shot(tmp_path, name="hero")
+    path = tmp_path / "shot.usda"
+    path.write_text('#usda 1.0\ndef "Hero" (\n    references = @./hero.usda@</Heroine>\n)\n{\n}\n')
+    with pytest.raises(NeuralocksError, match=r"could not compose all of it \(.*</Heroine>.*\); repair that$"):
+        bake(path, tmp_path / "a.usdc", model)

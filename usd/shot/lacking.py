@@ -14,7 +14,7 @@ from neuralocks_core.rig.hair_names import says_hair, says_hair_alone
 from ..border.values import as_names
 from ..skel.source import find_skeletons
 from .curves import find_curves
-from .notes import composition_notes
+from .notes import uncomposed
 
 MOST_VARIANTS = 64
 """Variants that are tried: each composes the stage anew."""
@@ -44,11 +44,7 @@ def no_skeleton(stage: Usd.Stage, path: Path) -> NeuralocksError:
 
 def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
     """The error for a stage that lacks what a bake needs; if layers are missing, it names them as the likely cause."""
-    missing = composition_notes(stage, path)
-    if missing:
-        loaded = missing[0].removeprefix(f"{path.name}: ").removesuffix("; skipping.")
-        remedy = f"parts of it are missing ({loaded}); add the files that it refers to"
-    return NeuralocksError(f"{path}: holds no {what}; {remedy}")
+    return NeuralocksError(f"{path}: holds no {what}; {uncomposed(stage) or remedy}")
 
 
 def has_hair_joints(prim: Usd.Prim) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Pcp, Usd, UsdGeom
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.boundary import joints_read
@@ -28,7 +28,25 @@ FEW = 3
 
 def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
     """What USD could not compose: missing layers, for example."""
-    return [f"{path.name}: {' '.join(text_of(error).split())[:200]}" for error in _composition_errors(stage)]
+    return [f"{path.name}: {_told(error)}" for error in _composition_errors(stage)]
+
+
+def uncomposed(stage: Usd.Stage) -> str:
+    """What USD could not compose, as the likely cause if a stage lacks something, and the remedy; '' if it could compose all."""
+    errors = _composition_errors(stage)
+    if missing := _without_file(errors):
+        return f"parts of it are missing ({_told(missing[0]).removesuffix('; skipping.')}); add the files that it refers to"
+    return f"USD could not compose all of it ({_told(errors[0])}); repair that" if errors else ""
+
+
+def _told(error) -> str:
+    return " ".join(text_of(error).split())[:200]
+
+
+def _without_file(errors: list) -> list:
+    """Those of files that cannot be read; others, such as of cycles, may name the stage's first layer."""
+    kinds = Pcp.ErrorType_InvalidAssetPath, Pcp.ErrorType_InvalidSublayerPath
+    return [error for error in errors if error.errorType in kinds]
 
 
 def _composition_errors(stage: Usd.Stage) -> list:
@@ -83,7 +101,7 @@ def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
     if os.path.realpath(out.parent) == os.path.dirname(os.path.realpath(stage.GetRootLayer().realPath)):
         return []
     found = {text_of(error) for error in _composition_errors(stage)}
-    told = [text_of(error) for error in _composition_errors(Usd.Stage.Open(str(out)))]
+    told = [text_of(error) for error in _without_file(_composition_errors(Usd.Stage.Open(str(out))))]
     lost = [text for text in told if text not in found]
     return [
         f"{out}: {' '.join(text.split())[:200].rstrip('.')}, which the shot finds from its own folder; write the bake there, or "

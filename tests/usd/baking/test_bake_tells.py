@@ -19,7 +19,7 @@ from usd.rig.stage import read_rigged_hair
 from usd.shot.stage import read_shot
 
 from ..rig_shots import model_for, small_shot
-from ..shots import CENTRE, write_shot
+from ..shots import CENTRE, edited, write_shot
 
 
 def test_sliders_that_a_model_never_heard_of_are_said(tmp_path, still_model):
@@ -82,6 +82,14 @@ def test_a_bake_that_does_not_find_the_shots_parts_from_its_own_folder_is_told_s
     notes = {name: bake(shot, tmp_path / name / "b.usdc", still_model, frames=[2]).notes for name in ("show", "cache")}
     assert not any("hero.usda" in note for note in notes["show"])
     assert any("hero.usda" in note and "SEARCH_PATH" in note for note in notes["cache"])
+
+
+def test_what_the_shot_cannot_compose_either_is_not_said_to_be_lost_by_the_bakes_folder(tmp_path, still_model):
+    """USD's words on a cycle name the stage's first layer, which is the bake's own."""
+    shot = edited(tmp_path, lambda stage: stage.GetPrimAtPath("/Hero/Skin").GetInherits().AddInherit("/Hero"))
+    (tmp_path / "cache").mkdir()
+    notes = bake(shot, tmp_path / "cache" / "b.usdc", still_model, frames=[2]).notes
+    assert any("Cycle" in note for note in notes) and not any("SEARCH_PATH" in note for note in notes)
 
 
 def test_a_bake_over_its_own_shot_is_refused(tmp_path, model):
