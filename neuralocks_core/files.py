@@ -29,8 +29,8 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     `path` are created. Enter the block before long work, to learn in time that a folder cannot be written.
 
     Raises:
-        NeuralocksError: it is a folder's name, or (CannotWrite) the file there is write-protected, or for every OSError in the
-            block; nothing is left of it, and what was under `path` stays.
+        NeuralocksError: it is a folder's name, or (CannotWrite) what is there is write-protected, a device or a pipe, or for every
+            OSError in the block; nothing is left of it, and what was under `path` stays.
     """
     path = Path(path)
     if os.path.isdir(path) and not os.path.islink(path):  # a link is replaced, whatever it points to
@@ -54,8 +54,8 @@ def check_writable(path: Path) -> None:
     """Check that a path can be written: before minutes of work, not after.
 
     Raises:
-        NeuralocksError: it is a folder's name or a write-protected file, or nothing can be written there; nothing is left of the
-            attempt.
+        NeuralocksError: it is a folder's name, a write-protected file, a device or a pipe, or nothing can be written there; nothing
+            is left of the attempt.
     """
     if os.path.isdir(path):  # also False for a name too long for a file, or where nobody may look: what follows tells
         raise NeuralocksError(f"{path}: is a folder; give a file name")
@@ -180,11 +180,13 @@ def make_way(path: Path) -> list[Path]:
 
     Raises:
         CannotWrite: the file is there and nobody may write it, as published files and those under some version controls are:
-            POSIX systems would let it be replaced all the same.
+            POSIX systems would let it be replaced all the same. So they would a device, such as /dev/null as root, or a pipe.
         OSError: the file system refuses; none of them is left.
     """
     if path.is_file() and not path.is_symlink() and not path.stat().st_mode & 0o222:
         raise CannotWrite(f"{path}: is write-protected; make it writable, or choose another name")
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise CannotWrite(f"{path}: is a device or a pipe, not a file; choose another name")
     missing = [folder for folder in path.parents if not os.path.exists(folder)]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

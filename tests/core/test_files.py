@@ -142,3 +142,16 @@ def test_what_nobody_may_write_stays_though_a_folder_would_let_it_be_replaced(tm
         ):
             attempt(path)
     assert path.read_bytes() == b"published" and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are of POSIX systems")
+def test_a_pipe_or_device_stays_what_it_is(tmp_path):
+    """Whoever may write into its folder could replace it: root, as in a container, would lose /dev/null."""
+    pipe, link = tmp_path / "pipe.usdc", tmp_path / "link.usdc"
+    os.mkfifo(pipe)
+    link.symlink_to(os.devnull)
+    for path in (pipe, link):
+        for attempt in (check_writable, lambda path: atomic_write(path).__enter__()):
+            with pytest.raises(CannotWrite, match=f"{path.name}: is a device or a pipe, not a file; choose another name"):
+                attempt(path)
+    assert pipe.is_fifo() and link.is_symlink() and {*tmp_path.iterdir()} == {pipe, link}
