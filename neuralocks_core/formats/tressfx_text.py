@@ -121,6 +121,7 @@ def _count(word: bytes, subject: str, number: int) -> int:
     return int(word)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # whoever reads the file refuses points that are not finite
 def _placed(points: np.ndarray, keys: dict[bytes, list[float]]) -> np.ndarray:
     scale = (keys.get(b"scale") or [1.0])[0]
     angles = keys.get(b"rotation") or []

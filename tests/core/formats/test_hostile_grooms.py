@@ -50,12 +50,14 @@ HOSTILE = {
     "nan.tfx": b"version 2.0\nis sorted 1\nstrand 0 numVerts 2\n0 0 0\n0 nan 1\n",
     "nostrand.tfx": b"version 2.0\nis sorted 1\n",
     "header2.tfx": b"version 2.0\n" + b"a 1\n" * 5000,
+    "scale.tfx": b"version 2.0\nscale 1e38\nis sorted 1\nstrand 0 numVerts 2\n0 0 0\n0 90 0\n",
     "unknown.xyz": b"hello",
     "nan.data": counted(3)[:8] + struct.pack("<f", np.nan) + counted(3)[12:],
     "far.data": counted(3)[:8] + struct.pack("<f", 3e38) + counted(3)[12:],
 }
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_files_get_one_line(folder, name):
     path = put(folder, name, HOSTILE[name])
