@@ -75,7 +75,8 @@ class RigModel:
         size = self.inputs
         if not layers:
             raise NeuralocksError("model: it has no layers; get an undamaged copy")
-        if self.limits.shape != (size,) or not np.isfinite(self.limits).all() or not 0 < self.max_angle < 3.1:
+        sane = (self.limits >= 0) & np.isfinite(self.limits)
+        if self.limits.shape != (size,) or not sane.all() or not 0 < self.max_angle < 3.1:
             raise NeuralocksError("model: its input limits do not fit its inputs; get an undamaged copy")
         reach = self.limits.astype(float)  # the largest that each number can be
         for weight, bias in layers:
@@ -85,8 +86,8 @@ class RigModel:
                 raise NeuralocksError("model: NaN or infinity in its weights; get an undamaged copy")
             size = len(weight)
             reach = np.abs(weight.astype(float)) @ reach + np.abs(bias)
-        if reach.max() > LARGEST:
-            raise NeuralocksError("model: its weights are too large to compute with; get an undamaged copy")
+            if reach.max(initial=0.0) > LARGEST:
+                raise NeuralocksError("model: its weights are too large to compute with; get an undamaged copy")
         if size != 3 * len(self.chains):
             raise NeuralocksError("model: it does not give three numbers per hair joint; get an undamaged copy")
 

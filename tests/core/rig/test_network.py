@@ -137,12 +137,15 @@ def test_layers_and_limits_that_do_not_fit_are_refused():
         (((first, bias),), "does not give three numbers per hair joint"),
         (((first * np.nan, bias), *others), "NaN or infinity in its weights"),
         (((first, bias + np.inf), *others), "NaN or infinity in its weights"),
+        # A later layer could make little of it, of infinity minus infinity nothing.
+        (((first, bias + np.float32(3e38)), (np.float32(1e-38) * others[0][0], others[0][1]), *others[1:]), "too large"),
     ):
-        with pytest.raises(NeuralocksError, match=f"model: .*{fact}; get an undamaged copy"):
+        with pytest.raises(NeuralocksError, match=f"model: .*{fact}.*; get an undamaged copy"):
             replace(model, layers=layers)
     for damage in (
         {"limits": model.limits[1:]},
         {"limits": np.nan * model.limits},
+        {"limits": -model.limits},
         {"max_angle": 0.0},
         {"max_angle": 3.2},
     ):
