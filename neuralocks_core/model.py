@@ -27,6 +27,8 @@ REMEDIES = {
 """Kind -> what a user can do about a training that diverged."""
 CARD = (("training", dict, "table of values"), ("report", dict, "table of values"), ("credits", list, "list of lines"))
 """Metadata of every model; empty if its file lacks it."""
+_DEEPEST = 200
+"""Values within values of the card, of which each training that goes on from another adds one: whoever shows it goes down as far."""
 _LARGEST = 64 << 20
 """Bytes of one unpacked entry; a model has about one million, so this refuses a zip bomb."""
 _LARGEST_FILE = 5 * _LARGEST
@@ -204,17 +206,23 @@ def _check(meta, path: Path, kind: str | None) -> None:
         raise NeuralocksError(f"{path}: model.json has no format number; get an undamaged copy of the model")
     if meta["format"] > FORMAT:
         raise NeuralocksError(
-            f"{path}: it has format {meta['format']}, this version reads up to {FORMAT}; update neuralocks"
+            f"{path}: it has format {str(meta['format'])[:40]}, this version reads up to {FORMAT}; update neuralocks"
         )
     if not isinstance(meta.get("kind"), str) or meta["kind"] not in KINDS:
-        raise NeuralocksError(f"{path}: it holds a '{meta.get('kind')}', unknown here; update neuralocks")
+        raise NeuralocksError(f"{path}: it holds a '{str(meta.get('kind'))[:40]}', unknown here; update neuralocks")
     for name, kind_of, said in CARD:
         if meta.get(name) is None:
             meta[name] = kind_of()
-        if not isinstance(meta[name], kind_of):
+        if not isinstance(meta[name], kind_of) or _nested(meta[name], _DEEPEST):
             raise NeuralocksError(f"{path}: its '{name}' is not a {said}; get an undamaged copy of the model")
     if kind and meta["kind"] != kind:
         names = {"strands": "strand hair", "rig": "rigged mesh hair"}
         raise NeuralocksError(
             f"{path}: it is a model for {names[meta['kind']]}, not for {names[kind]}; give one that is"
         )
+
+
+def _nested(value, deepest: int) -> bool:
+    """Whether there are values within values beyond so many levels."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return deepest < 0 or any(_nested(part, deepest - 1) for part in parts)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The one-file model: what is written comes back, and what is no model is refused in one line."""
 
+import json
 import os
 import random
 import re
@@ -21,6 +22,30 @@ def test_what_a_model_does_not_say_of_itself_is_empty(tmp_path):
     file = model.read(PATH)
     quiet = model.write(tmp_path / "quiet.neuralocks", {**file.meta, "training": None, "credits": None}, file.graphs)
     assert [model.read(quiet).meta[name] for name in ("training", "credits")] == [{}, []]
+
+
+def test_what_nobody_could_show_is_refused(tmp_path):
+    file = model.read(PATH)
+    deep, card = [], {}
+    for _ in range(300):
+        deep = [deep]
+    for _ in range(100):  # as many trainings, each going on from the one before
+        card = {"began with": card}
+    with pytest.raises(
+        NeuralocksError, match="deep.neuralocks: its 'report' is not a table of values; get an undamaged"
+    ):
+        model.read(model.write(tmp_path / "deep.neuralocks", file.meta | {"report": {"rows": deep}}, file.graphs))
+    assert (
+        model.read(model.write(tmp_path / "long.neuralocks", file.meta | {"training": card}, file.graphs)).meta[
+            "training"
+        ]
+        == card
+    )
+    for name in ("kind", "format"):
+        meta = json.dumps(file.meta | {name: "x" * 3000 if name == "kind" else 10**3000}).encode()
+        with pytest.raises(NeuralocksError, match="odd.neuralocks: .*; update neuralocks") as caught:
+            model.read(rewritten(PATH, tmp_path / "odd.neuralocks", model_json=meta))
+        assert len(str(caught.value)) < len(str(tmp_path)) + 200
 
 
 def test_truncated_missing_and_foreign_files_are_refused(tmp_path):

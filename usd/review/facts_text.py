@@ -27,9 +27,9 @@ def as_text(facts: dict, indent: int = 0) -> str:
             )
         elif isinstance(value, dict) and value:
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
+        elif isinstance(value, list) and value and all(isinstance(entry, dict) and entry for entry in value):
             lines += _each(name, value, indent)
-        elif name == "joint names":
+        elif name == "joint names" and isinstance(value, list) and all(isinstance(joint, str) for joint in value):
             lines.append(f"{pad}{name}: {', '.join(map(leaf, value))}")
         else:
             lines.append(f"{pad}{name}: {_short(value)}")
@@ -58,10 +58,13 @@ def _each(name: str, entries: list[dict], indent: int) -> list[str]:
 def _is_table(value) -> bool:
     """Whether it has rows of several numbers, of which each is a line."""
     rows = list(value.values()) if isinstance(value, dict) else []
-    numbers = (
-        isinstance(row, dict) and len(row) > 1 and all(isinstance(v, int | float) for v in row.values()) for row in rows
-    )
+    numbers = (isinstance(row, dict) and len(row) > 1 and all(_is_number(v) for v in row.values()) for row in rows)
     return bool(rows) and all(numbers)
+
+
+def _is_number(value) -> bool:
+    """Whether it can be written with few digits, which whole numbers of hundreds of digits cannot."""
+    return isinstance(value, float) or isinstance(value, int) and abs(value) < 1e300
 
 
 def _short(value) -> str:

@@ -22,3 +22,17 @@ def test_what_holds_nothing_is_none():
     assert as_text({"report": {"falls short": {}, "rows": [], "best": None}}).split() == (
         "report: falls short: none rows: none best: none".split()
     )
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        {"rows": [{}]},
+        {"rows": [{"a": 1}, 2]},
+        {"joint names": 5},
+        {"joint names": [None]},
+        {"a": {"b": 10**400, "c": 1}},
+    ],
+)
+def test_a_card_that_somebody_else_wrote_may_hold_anything(odd):
+    assert as_text({"training": odd}).startswith("training:\n")
