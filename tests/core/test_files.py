@@ -152,6 +152,8 @@ def test_a_pipe_or_device_stays_what_it_is(tmp_path):
     link.symlink_to(os.devnull)
     for path in (pipe, link):
         for attempt in (check_writable, lambda path: atomic_write(path).__enter__()):
-            with pytest.raises(CannotWrite, match=f"{path.name}: is a device or a pipe, not a file; choose another name"):
+            with pytest.raises(
+                CannotWrite, match=f"{path.name}: is a device or a pipe, not a file; choose another name"
+            ):
                 attempt(path)
     assert pipe.is_fifo() and link.is_symlink() and {*tmp_path.iterdir()} == {pipe, link}

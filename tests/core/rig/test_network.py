@@ -138,7 +138,10 @@ def test_layers_and_limits_that_do_not_fit_are_refused():
         (((first * np.nan, bias), *others), "NaN or infinity in its weights"),
         (((first, bias + np.inf), *others), "NaN or infinity in its weights"),
         # A later layer could make little of it, of infinity minus infinity nothing.
-        (((first, bias + np.float32(3e38)), (np.float32(1e-38) * others[0][0], others[0][1]), *others[1:]), "too large"),
+        (
+            ((first, bias + np.float32(3e38)), (np.float32(1e-38) * others[0][0], others[0][1]), *others[1:]),
+            "too large",
+        ),
     ):
         with pytest.raises(NeuralocksError, match=f"model: .*{fact}.*; get an undamaged copy"):
             replace(model, layers=layers)
