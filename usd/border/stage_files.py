@@ -66,12 +66,14 @@ def check_file(path: Path) -> None:
     """Refuse what is not a file.
 
     Raises:
-        NeuralocksError: it is missing, or a folder.
+        NeuralocksError: it is missing, a folder, or a pipe or device, which may never end.
     """
     if not path.exists():
         raise NeuralocksError(f"{path}: no such file; check the path")
     if path.is_dir():
         raise NeuralocksError(f"{path}: is a folder; name the USD file in it")
+    if not path.is_file():
+        raise NeuralocksError(f"{path}: is a pipe or a device; name a USD file")
 
 
 def _remedy(path: Path) -> str:

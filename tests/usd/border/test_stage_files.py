@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """USD files that are written again while this process holds them open, and files that are read only at times."""
 
+import os
+
 import pytest
 from pxr import Sdf, Usd
 
 from neuralocks_core.errors import NeuralocksError
-from usd.border.stage_files import check_not_input, open_stage, write_stage
+from usd.border.stage_files import check_file, check_not_input, open_stage, write_stage
 
 
 def test_a_file_that_is_still_open_is_read_as_it_was_written_last(tmp_path):
@@ -79,3 +81,11 @@ def test_a_layer_whose_samples_have_no_rate_is_named(tmp_path, rate, referred):
         with pytest.raises(NeuralocksError, match=r"^moves.usda: timeCodesPerSecond is (0|nan|inf); set it to"):
             open_stage(path)
     assert open_stage(shot("stands.usda")).GetAttributeAtPath("/Hair.x").Get() == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are of POSIX systems")
+def test_a_pipe_is_not_waited_for(tmp_path):
+    """USD would wait for ever for somebody who writes to it."""
+    os.mkfifo(tmp_path / "shot.usda")
+    with pytest.raises(NeuralocksError, match="shot.usda: is a pipe or a device; name a USD file"):
+        check_file(tmp_path / "shot.usda")
