@@ -118,3 +118,20 @@ def test_every_operation_has_the_shape_that_onnx_infers(rows):
 def test_what_is_written_otherwise_than_ours_is_refused(nodes):
     with pytest.raises(ValueError):
         odd_part(_graph(nodes, {}))
+
+
+@pytest.mark.parametrize("field", [b"\0\0", b"\x48\x01"])
+def test_a_graph_of_millions_of_fields_is_not_read_to_its_end(field):
+    """A file of a few kilobytes may unpack to it, and take minutes."""
+    data = field * (2 << 20)
+    for graph in (data, _field(7, data), _field(7, _field(5, data)), _field(7, _field(5, _field(1, data)))):
+        with pytest.raises(ValueError, match="too many"):
+            odd_part(graph)
+
+
+def _field(number: int, content: bytes) -> bytes:
+    size, left = bytearray(), len(content)
+    while left > 127:
+        size.append(left & 127 | 128)
+        left >>= 7
+    return bytes([number << 3 | 2, *size, left]) + content
