@@ -118,4 +118,8 @@ def _written(told: dict) -> set[str]:
     grooms = told.get("grooms")
     parts = told.get("graphs"), grooms.get("files") if isinstance(grooms, dict) else None
     names = {str(name) for part in parts if isinstance(part, dict) for name in part}
-    return {name for name in names if Path(name).name == name and Path(name).suffix in (".onnx", ".npz")}
+    return {
+        name
+        for name in names
+        if name.isprintable() and Path(name).name == name and Path(name).suffix in (".onnx", ".npz")
+    }

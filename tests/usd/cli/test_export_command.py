@@ -47,6 +47,14 @@ def test_nothing_of_an_earlier_export_is_left_beside_other_graphs(tmp_path, mode
     assert (tmp_path / "shot.npz").exists()
 
 
+def test_names_that_no_file_has_in_an_earlier_description_are_passed_over(tmp_path, model):
+    told = json.dumps({"units": 0, "model": 0, "graphs": {"\0.onnx": 0, "\ud800.onnx": 0, "old.onnx": 0}})
+    (tmp_path / "description.json").write_text(told)
+    (tmp_path / "old.onnx").write_bytes(b"old")
+    assert status("export", model, "-o", tmp_path) == 0
+    assert not (tmp_path / "old.onnx").exists()
+
+
 def test_a_failed_export_leaves_no_part_of_a_file(tmp_path, model, monkeypatch, capsys):
     shot, written, write = write_shot(tmp_path), [], Path.write_bytes
 
