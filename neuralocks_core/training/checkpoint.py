@@ -127,6 +127,8 @@ def _fill(optimiser: torch.optim.Optimizer, tensors: dict[str, torch.Tensor]) ->
             shape = () if key == "step" else parameters[index].shape
             if value.shape != shape or not value.is_floating_point():
                 raise _Unfit(f"its optimiser has {tuple(value.shape)} numbers where {tuple(shape)} belong")
+            if key in ("step", "exp_avg_sq") and (value < 0).any():  # a count, and squares
+                raise _Unfit("damaged")
     optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
 
 

@@ -49,6 +49,8 @@ def step(net, optimisers):
         {"optimiser/1/0/exp_avg": np.zeros(2, np.int64)},
         {"optimiser/1/0/exp_avg": None},
         {"optimiser/1/0/step": np.ones(2, np.float32)},
+        {"optimiser/1/0/step": np.array(-7, np.float32)},
+        {"optimiser/1/0/exp_avg_sq": np.full(2, -1, np.float32)},
     ],
 )
 def test_a_damaged_checkpoint_is_one_line(tmp_path, changes):
