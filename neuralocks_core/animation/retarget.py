@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from neuralocks_core import rotation
-from neuralocks_core.anatomy.humanoid import TRUNK, Humanoid
+from neuralocks_core.anatomy.humanoid import TRUNK, Humanoid, NoHead
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.formats.bvh import Motion
@@ -27,7 +27,7 @@ If None, both rest poses are assumed to agree: soles lie flat in both.
 """
 
 
-def retarget(motion: Motion, character: Character) -> Clip:
+def retarget(motion: Motion, character: Character, humanoid: Humanoid | None = None) -> Clip:
     """Put a motion on a character.
 
     Each joint gets the source's rotation from its rest pose, after the character's bone is turned from its bind
@@ -37,12 +37,16 @@ def retarget(motion: Motion, character: Character) -> Clip:
     Args:
         motion: from `formats.bvh.read_bvh`.
         character: who will move; Y up, feet on Y = 0 in bind pose.
+        humanoid: the source's joints by meaning; found by name if left out.
 
     Raises:
-        NeuralocksError: the source has no joints that are named like a head or hips.
+        NeuralocksError: no joint of the source is named like a head.
     """
     with about(motion.name):
-        source = Character(motion.skeleton)
+        try:
+            source = Character(motion.skeleton, humanoid=humanoid)
+        except NoHead:  # --head and --joint name the character's
+            raise NeuralocksError("no joint is named like a head; rename it in the file, to Head") from None
     turns = _turns(motion, source, character)
     joints = _posed(turns, character, len(motion.clip.times))
     joints[..., :3, 3] += _travel(motion, source, character, joints)[:, None]

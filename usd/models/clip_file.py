@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from pxr import UsdSkel
 
+from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.animation.retarget import retarget
@@ -46,7 +47,7 @@ def read_clip(path: str, character: Character, notes: list[str] | None = None, b
     """
     if Path(path).suffix.lower() == ".bvh":
         captured = read_bvh(path)
-        clip = _retargeted(captured, character)
+        clip = _retargeted(replace(captured, name=str(path)), character)
         if notes is not None:
             notes += motion_notes(captured, clip.joints, character.humanoid)
         return clip
@@ -89,12 +90,12 @@ def _on(character: Character, mover: StageRig, path: Path, notes: list[str] | No
             f"{path}: its bind pose is not the character's ('{furthest}' is {apart.max():.2g} m elsewhere), so the motion is "
             "retargeted, as a BVH's is"
         )
-    return _retargeted(Motion(path.stem, mover.character.skeleton, clip, 1.0), character)
+    return _retargeted(Motion(str(path), mover.character.skeleton, clip, 1.0), character, character.humanoid)
 
 
-def _retargeted(motion: Motion, character: Character) -> Clip:
+def _retargeted(motion: Motion, character: Character, humanoid: Humanoid | None = None) -> Clip:
     """The motion on the character, with its cuts: where two takes were joined, or a T-pose leads in, nobody flew through the room."""
-    clip = retarget(motion, character)
+    clip = retarget(motion, character, humanoid)
     return replace(clip, cuts=find_cuts(clip, character.head))
 
 

@@ -152,6 +152,13 @@ def test_motion_of_a_character_whose_head_has_another_name_needs_no_second_word(
     layer.Export(str(tmp_path / "clip.usda"))
     clip = read_clip(str(tmp_path / "clip.usda"), character)
     assert len(clip.times) > 1
+    binds = layer.GetAttributeAtPath("/Hero/Rig.bindTransforms")
+    moved = np.array(binds.default)
+    moved[6:, 3, 0] *= 1.5  # longer arms, so that the motion is put on ours
+    binds.default, notes = Vt.Matrix4dArray.FromNumpy(moved), []
+    layer.Export(str(tmp_path / "elsewhere.usda"))
+    elsewhere = read_clip(str(tmp_path / "elsewhere.usda"), character, notes)
+    assert len(elsewhere.times) == len(clip.times) and "so the motion is retargeted" in notes[0]
     layer.GetAttributeAtPath("/Hero/Rig.joints").default = [f"other{n}" for n in range(8)]
     layer.Export(str(tmp_path / "other.usda"))
     with pytest.raises(NeuralocksError, match="other.usda: its skeleton is not the character's"):

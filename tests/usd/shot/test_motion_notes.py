@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `inspect`, and training, say about motion capture."""
 
+import re
+
 import numpy as np
 import pytest
 
+from neuralocks_core.errors import NeuralocksError
 from usd.models.clip_file import read_clip
 from usd.review.inspect import inspect
 from usd.shot.stage import read_rigs
@@ -42,3 +45,16 @@ def test_motion_of_no_person_is_told(tmp_path):
     path.write_text(path.read_text().replace("Head", "Top").replace("Neck", "Column"))
     (said,) = inspect(path)["spoils"]
     assert said == "take.bvh: no joint is named like a head, so it moves no character; rename its joints"
+
+
+def test_motion_without_a_head_is_named_by_its_file(tmp_path):
+    """--head and --joint name joints of the character, not of the motion."""
+    path = write_bvh(tmp_path / "take.bvh", STAND)
+    number = iter(range(100))
+    nameless = re.sub(r"(ROOT|JOINT) \S+", lambda found: f"{found[1]} Bone{next(number)}", path.read_text())
+    character = read_rigs(write_shot(tmp_path, Recipe(bound="mesh")))[0].character
+    path.write_text(nameless)
+    with pytest.raises(
+        NeuralocksError, match=rf"^{re.escape(str(path))}: no joint is named like a head; rename it in the"
+    ):
+        read_clip(str(path), character)
