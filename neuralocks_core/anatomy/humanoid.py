@@ -106,7 +106,9 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
 
 def named_head(names) -> str | None:
     """Path of the joint that is the head by names and hierarchy alone, among joint paths (J) separated by `/`; None if none is."""
-    place = {name: index for index, name in enumerate(names)}
+    place = {
+        name: index for index, name in enumerate(names) if name
+    }  # else one without a name is above all roots, and itself
     if not place:
         return None
     try:

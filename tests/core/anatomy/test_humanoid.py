@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from neuralocks_core.anatomy.humanoid import find_humanoid
+from neuralocks_core.anatomy.humanoid import find_humanoid, named_head
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from tests.core.anatomy.common_rigs import RIGS
@@ -81,6 +81,13 @@ def test_a_rig_without_a_head_is_refused_with_the_remedy():
     paths, parents = rig("root\n wheel_L\n wheel_R")
     with pytest.raises(NeuralocksError, match="--head"):
         find_humanoid(paths, parents)
+
+
+@pytest.mark.timeout(20)
+def test_a_joint_without_a_name_is_above_no_other():
+    names = ["hips", "", "hips/neck", "hips/neck/head"]
+    assert named_head(names) == "hips/neck/head"
+    assert named_head(names[:2]) is None
 
 
 def test_a_hand_is_what_is_farthest_from_its_shoulder():
