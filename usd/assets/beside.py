@@ -131,9 +131,9 @@ def _stays(kind: Sdf.ValueTypeName) -> str:
 def _varying_sizes(curves: UsdGeom.BasisCurves, points: int) -> set[int]:
     """How many varying values curves with this many points in all may have: one for each end of a segment."""
     known, basis = (UsdGeom.Tokens.bezier, UsdGeom.Tokens.bspline, UsdGeom.Tokens.catmullRom), curves.GetBasisAttr()
-    is_token = all(spec.typeName == Sdf.ValueTypeNames.Token for spec in basis.GetPropertyStack())
-    if curves.GetTypeAttr().Get() == UsdGeom.Tokens.cubic and not (is_token and basis.Get() in known):
+    is_token, time = all(each.typeName == "token" for each in basis.GetPropertyStack()), Usd.TimeCode.EarliestTime()
+    if curves.GetTypeAttr().Get(time) == UsdGeom.Tokens.cubic and not (is_token and basis.Get(time) in known):
         return {points}  # as of lines; USD would divide by zero
-    sizes = {curves.ComputeVaryingDataSize(Usd.TimeCode.EarliestTime())}
+    sizes = {curves.ComputeVaryingDataSize(time)}
     # Pinned curves are drawn through their first and last points, too; not all tools count segments there.
     return sizes | ({points} if curves.GetWrapAttr().Get() == UsdGeom.Tokens.pinned else set())

@@ -76,6 +76,11 @@ def test_curves_of_an_unknown_basis_are_imported(kind, basis, tmp_path):
     layer.Save()
     (groom,), _ = import_groom(shot, tmp_path / "out.usda")
     assert groom.strand_count == 40
+    layer.GetAttributeAtPath("/Hero/Hair.basis").default = "bspline"
+    layer.SetTimeSample("/Hero/Hair.basis", 1.0, basis)
+    layer.Save()
+    (groom,), _ = import_groom(shot, tmp_path / "out.usda")
+    assert groom.strand_count == 40
 
 
 def test_parts_in_one_unknown_unit_keep_together(tmp_path):
