@@ -4,7 +4,9 @@
 from collections.abc import Iterator
 
 MOST = 1 << 14
-"""Fields of one message, or numbers of one field; none of ours has a tenth of that. Each takes this reader a microsecond, and a megabyte may hold half a million."""
+"""Fields of one message, or numbers of one field: each takes this reader a microsecond, and a megabyte may hold half a million. No
+message of ours has a tenth of that.
+"""
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 """How a field is stored."""
 

@@ -106,9 +106,8 @@ def find_humanoid(names, parents, positions=None, by_hand: dict[str, str] | None
 
 def named_head(names) -> str | None:
     """Path of the joint that is the head by names and hierarchy alone, among joint paths (J) separated by `/`; None if none is."""
-    place = {
-        name: index for index, name in enumerate(names) if name
-    }  # else one without a name is above all roots, and itself
+    # One without a name would be above all roots, and above itself.
+    place = {name: index for index, name in enumerate(names) if name}
     if not place:
         return None
     try:

@@ -25,9 +25,8 @@ def as_numbers(attribute: Usd.Attribute, wanted: str, value, dtype=float) -> np.
     """
     shape = SHAPES[wanted]
     try:
-        with np.errstate(
-            invalid="raise", over="ignore"
-        ):  # NaN as a whole number; too large for single precision is infinite
+        # NaN is no whole number; what is too large for single precision becomes infinite.
+        with np.errstate(invalid="raise", over="ignore"):
             found = np.asarray(() if value is None else value, dtype)
     except (TypeError, ValueError, OverflowError, FloatingPointError):  # names, for example
         raise _unlike(attribute, wanted) from None
