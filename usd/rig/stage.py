@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stage's rigged mesh hair: which skeleton carries it, its chains, its meshes."""
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from glob import escape
 from pathlib import Path
@@ -25,6 +26,7 @@ from ..border.prim_paths import prim_path
 from ..border.stage_files import open_stage
 from ..border.stopping import check
 from ..border.units import Border
+from ..border.values import as_names
 from ..shot.lacking import has_hair_joints, nothing_found
 from ..shot.notes import partial_body
 from ..shot.others import Others
@@ -187,8 +189,11 @@ def of_skeleton(path: str, error) -> NeuralocksError:
 
 def _is_hairy(prim: Usd.Prim, model: HairChains | None) -> bool:
     """Whether joints of a Skeleton are named like hair, or like those of a model."""
-    names = () if model is None else UsdSkel.Skeleton(prim).GetJointsAttr().Get() or ()
-    return has_hair_joints(prim) or any(leaf(str(name)) in model.names for name in names)
+    joints = UsdSkel.Skeleton(prim).GetJointsAttr()
+    with suppress(NeuralocksError):  # errors in them are reported when the skeleton is read
+        names = () if model is None else as_names(joints, joints.Get())
+        return has_hair_joints(prim) or any(leaf(name) in model.names for name in names)
+    return False
 
 
 def _of_model(model: HairChains, character: Character) -> HairChains:

@@ -2,6 +2,7 @@
 """What a rig bake is given and tells: options that it refuses before it writes, and all its notes."""
 
 import pytest
+from pxr import Sdf
 
 from neuralocks_core.errors import NeuralocksError
 from usd.rig.bake import bake_rig
@@ -28,6 +29,17 @@ def test_what_no_bake_can_use_is_refused_and_nothing_is_written(tmp_path, option
     with pytest.raises(NeuralocksError, match=words):
         bake_rig(shot, out, model, **{name: value for name, value in options.items() if name != "out"})
     assert [each.name for each in tmp_path.iterdir()] == ["shot.usda"] and shot.read_bytes() == before
+
+
+def test_joints_of_another_type_than_names_are_told(tmp_path):
+    shot = small_shot(tmp_path / "shot.usda")
+    model, layer = model_for(read_rigged_hair(shot)), Sdf.Layer.FindOrOpen(str(shot))
+    rig = layer.GetPrimAtPath("/Who/Rig")
+    rig.RemoveProperty(rig.attributes["joints"])
+    Sdf.AttributeSpec(rig, "joints", Sdf.ValueTypeNames.Float).default = 1.0
+    layer.Save()
+    with pytest.raises(NeuralocksError, match=r"/Who/Rig: its joints are float, not token\[\]; export it again"):
+        bake_rig(shot, tmp_path / "hair.usda", model)
 
 
 def test_all_notes_are_told_those_known_before_hair_is_turned_first(tmp_path):
