@@ -120,10 +120,12 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(
 
 
 def test_hair_learns_to_move_in_a_minute(scene, tmp_path, monkeypatch):
-    """On motion and strands that it never saw, the network errs clearly less than hair carried rigidly."""
+    """On motion and strands that it never saw, the network errs clearly less than hair carried rigidly. Of so little to learn, a step of
+    Muon, the default, takes more than three times as long.
+    """
     monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 8)
     messages = []
-    options = RegressionOptions(steps=400, clips=8, strands=6, rate=1e-2, seed=2)
+    options = RegressionOptions(steps=500, clips=8, strands=6, rate=4e-3, optimiser="adamw", seed=2)
     path = train_strands(
         scene, tmp_path / "hair.neuralocks", options, rollouts=40, progress=lambda *a: messages.append(a)
     )
