@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -72,7 +73,8 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
         check()
     # Beside graphs of another model, data of an earlier export would give wrong hair without a word.
     for name in _written(before or {}) - {*files, *tables}:
-        (folder / name).unlink(missing_ok=True)
+        if os.path.isfile(folder / name):  # also False for a name that no disk can hold
+            (folder / name).unlink()
     return [folder / name for name in (*files, *tables)]
 
 
@@ -118,8 +120,4 @@ def _written(told: dict) -> set[str]:
     grooms = told.get("grooms")
     parts = told.get("graphs"), grooms.get("files") if isinstance(grooms, dict) else None
     names = {str(name) for part in parts if isinstance(part, dict) for name in part}
-    return {
-        name
-        for name in names
-        if name.isprintable() and Path(name).name == name and Path(name).suffix in (".onnx", ".npz")
-    }
+    return {name for name in names if Path(name).name == name and Path(name).suffix in (".onnx", ".npz")}

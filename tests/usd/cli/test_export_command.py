@@ -48,7 +48,8 @@ def test_nothing_of_an_earlier_export_is_left_beside_other_graphs(tmp_path, mode
 
 
 def test_names_that_no_file_has_in_an_earlier_description_are_passed_over(tmp_path, model):
-    told = json.dumps({"units": 0, "model": 0, "graphs": {"\0.onnx": 0, "\ud800.onnx": 0, "old.onnx": 0}})
+    names = "\0.onnx", "\ud800.onnx", f"{'long' * 99}.onnx", "old.onnx"
+    told = json.dumps({"units": 0, "model": 0, "graphs": dict.fromkeys(names, 0)})
     (tmp_path / "description.json").write_text(told)
     (tmp_path / "old.onnx").write_bytes(b"old")
     assert status("export", model, "-o", tmp_path) == 0
