@@ -131,7 +131,9 @@ def _stays(kind: Sdf.ValueTypeName) -> str:
 def _varying_sizes(curves: UsdGeom.BasisCurves, points: int) -> set[int]:
     """How many varying values curves with this many points in all may have: one for each end of a segment."""
     known, basis = (UsdGeom.Tokens.bezier, UsdGeom.Tokens.bspline, UsdGeom.Tokens.catmullRom), curves.GetBasisAttr()
-    is_token, time = all(each.typeName == "token" for each in basis.GetPropertyStack()), Usd.TimeCode.EarliestTime()
+    time = Usd.TimeCode.EarliestTime()
+    # A relationship of that name has no type.
+    is_token = all(getattr(each, "typeName", "") == "token" for each in basis.GetPropertyStack())
     if curves.GetTypeAttr().Get(time) == UsdGeom.Tokens.cubic and not (is_token and basis.Get(time) in known):
         return {points}  # as of lines; USD would divide by zero
     sizes = {curves.ComputeVaryingDataSize(time)}

@@ -81,6 +81,12 @@ def test_curves_of_an_unknown_basis_are_imported(kind, basis, tmp_path):
     layer.Save()
     (groom,), _ = import_groom(shot, tmp_path / "out.usda")
     assert groom.strand_count == 40
+    hair = layer.GetPrimAtPath("/Hero/Hair")
+    hair.RemoveProperty(hair.attributes["basis"])
+    Sdf.RelationshipSpec(hair, "basis")
+    layer.Save()
+    (groom,), _ = import_groom(shot, tmp_path / "out.usda")
+    assert groom.strand_count == 40
 
 
 def test_parts_in_one_unknown_unit_keep_together(tmp_path):
