@@ -22,6 +22,8 @@ USD = (*LAYERS, ".usdz")
 GLTF = (".vrm", ".glb", ".gltf")
 OTHERS = (".fbx", *GLTF, ".abc", ".blend")
 """Characters and hair in other formats, which USD reads only with plug-ins or not at all."""
+LOWEST_RATE = 1e-100
+"""Time codes per second of a layer, by which USD divides: far fewer would put its samples at infinity, as none do."""
 
 
 def open_stage(path) -> Usd.Stage:
@@ -55,11 +57,24 @@ def _check_rates(stage: Usd.Stage) -> None:
     """Refuse layers whose time samples, or those of layers in it, no stage can place in time: USD would search without end."""
     for layer in stage.GetUsedLayers():
         rate = layer.timeCodesPerSecond
-        if (not math.isfinite(rate) or not rate) and (
-            layer.GetCompositionAssetDependencies() or layer.ListAllTimeSamples()
+        if not LOWEST_RATE < abs(rate) < math.inf and (
+            layer.GetCompositionAssetDependencies() or layer.ListAllTimeSamples() or _has_clips(layer)
         ):
             name = layer.GetDisplayName()
             raise NeuralocksError(f"{name}: timeCodesPerSecond is {rate:g}; set it to the frame rate, such as 24")
+
+
+def _has_clips(layer: Sdf.Layer) -> bool:
+    """Whether a prim of the layer, or of a variant in it, takes its samples from other files."""
+    found: list[Sdf.Path] = []
+
+    def look(path: Sdf.Path) -> None:
+        prim = layer.GetPrimAtPath(path)
+        if prim and prim.HasInfo("clips"):
+            found.append(path)
+
+    layer.Traverse(Sdf.Path.absoluteRootPath, look)
+    return bool(found)
 
 
 def check_file(path: Path) -> None:

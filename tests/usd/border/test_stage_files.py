@@ -54,7 +54,7 @@ def test_a_value_clip_that_is_not_open_yet_is_not_written_over(tmp_path):
     check_not_input(tmp_path / "hair.3.usda", stage)
 
 
-@pytest.mark.parametrize("rate", [0.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("rate", [0.0, 1e-310, float("nan"), float("inf")])
 @pytest.mark.parametrize("referred", [False, True])
 def test_a_layer_whose_samples_have_no_rate_is_named(tmp_path, rate, referred):
     """USD would ask for its samples without end; what has no samples has no use for a rate."""
@@ -78,9 +78,21 @@ def test_a_layer_whose_samples_have_no_rate_is_named(tmp_path, rate, referred):
         layer.timeCodesPerSecond = rate
         layer.Save()
     for path in (shot("moves.usda"), shot("shot_moves.usda")):
-        with pytest.raises(NeuralocksError, match=r"^moves.usda: timeCodesPerSecond is (0|nan|inf); set it to"):
+        with pytest.raises(NeuralocksError, match=r"^moves.usda: timeCodesPerSecond is (0|1e-310|nan|inf); set it to"):
             open_stage(path)
     assert open_stage(shot("stands.usda")).GetAttributeAtPath("/Hair.x").Get() == 1
+
+
+@pytest.mark.parametrize(
+    "within", ['def "Hair" ({clips}) {{\n}}', 'def "Hair" {{\nvariantSet "v" = {{\n"a" ({clips}) {{\n}}\n}}\n}}']
+)
+def test_a_layer_whose_clips_have_no_rate_is_named(tmp_path, within):
+    """Its samples lie in files that are opened only when they are asked for."""
+    clips = 'clips = { dictionary default = { asset[] assetPaths = [@./a.usda@]\n string primPath = "/Hair" } }'
+    path = tmp_path / "clips.usda"
+    path.write_text("#usda 1.0\n(timeCodesPerSecond = 0)\n" + within.format(clips=clips.replace(" }", "\n}")))
+    with pytest.raises(NeuralocksError, match=r"^clips.usda: timeCodesPerSecond is 0; set it to"):
+        open_stage(path)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are of POSIX systems")
