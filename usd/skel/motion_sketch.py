@@ -2,7 +2,6 @@
 """What moves a skeleton, as a `sketch`: the same wherever a set places the character, and whatever its prims are called."""
 
 from collections.abc import Iterator
-from contextlib import suppress
 
 import numpy as np
 
@@ -33,6 +32,14 @@ def _blocks(source: JointSource, rate: float) -> Iterator[np.ndarray]:
     for first in range(0, len(codes), AT_A_TIME):
         some = codes[first : first + AT_A_TIME]
         yield source.local(some)
-        with suppress(NeuralocksError):  # reported when they are read for a mesh; others may be anything
-            yield source.shape(names, some)
+        yield from _weights(source, names, some)
         yield np.array([back @ source.placement.at(code) for code in some if moves])
+
+
+def _weights(source: JointSource, names: tuple[str, ...], codes: list[float]) -> Iterator[np.ndarray]:
+    """Blend shape weights; those that are broken are left out, and reported when they are read for a mesh."""
+    try:
+        yield source.shape(names, codes)
+    except NeuralocksError:
+        for name in names if len(names) > 1 else ():
+            yield from _weights(source, (name,), codes)

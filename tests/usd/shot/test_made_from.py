@@ -87,6 +87,21 @@ def test_weights_of_shapes_that_no_mesh_has_may_be_anything(tmp_path, model, wei
     assert OLD.format("animation") in inspect(out)["spoils"]
 
 
+def test_a_weight_that_may_be_anything_hides_no_change_of_others(tmp_path, model):
+    shot, out = write_shot(tmp_path), tmp_path / "hair.usdc"
+    stage = Usd.Stage.Open(str(shot))
+    motion = UsdSkel.Animation(stage.GetPrimAtPath("/Hero/Rig/Motion"))
+    motion.CreateBlendShapesAttr(["smile", "unused"])
+    weights = motion.CreateBlendShapeWeightsAttr()
+    weights.Set([0.5, float("nan")], 3)
+    stage.Save()
+    bake(shot, out, model, frames="1:2")
+    assert not any("bake again" in note for note in inspect(out)["spoils"])
+    weights.Set([0.75, float("nan")], 3)
+    stage.Save()
+    assert OLD.format("animation") in inspect(out)["spoils"]
+
+
 @pytest.mark.parametrize("recipe", [Recipe(unit=0.01, up="Z"), Recipe(bound="mesh"), Recipe(bound="none", frames=3)])
 def test_a_set_that_shows_a_bake_elsewhere_is_no_other_shot(tmp_path, model, recipe):
     """Placed, turned, seen through a reference or flattened, shifted in time, or counted in another unit."""
