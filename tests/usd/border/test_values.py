@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
 from usd.border.values import as_names, as_numbers
@@ -59,6 +59,11 @@ def test_what_is_no_whole_number_is_no_index(made, value):
 def test_a_number_beyond_single_precision_is_infinite_there(made):
     attribute = made("double3[]", [(0, 1e300, 0)])
     assert as_numbers(attribute, "point3f[]", attribute.Get(), np.float32).tolist() == [[0, np.inf, 0]]
+
+
+def test_a_signalling_nan_is_a_number_like_any_nan(made):
+    attribute = made("float[]", Vt.FloatArray.FromNumpy(np.array([0x7FA00000], np.uint32).view(np.float32)))
+    assert np.isnan(as_numbers(attribute, "float[]", attribute.Get())).all()
 
 
 def test_no_value_and_an_empty_one_are_no_rows(made):
