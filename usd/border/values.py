@@ -25,7 +25,7 @@ def as_numbers(attribute: Usd.Attribute, wanted: str, value, dtype=float) -> np.
     """
     shape = SHAPES[wanted]
     try:
-        # NaN is no whole number; what is too large for single precision becomes infinite. Some NaN raise as numbers, too.
+        # NaN is no whole number, but a number, also one that signals; what is too large for single precision becomes infinite.
         with np.errstate(invalid="raise" if np.issubdtype(dtype, np.integer) else "ignore", over="ignore"):
             found = np.asarray(() if value is None else value, dtype)
     except (TypeError, ValueError, OverflowError, FloatingPointError):  # names, for example

@@ -120,8 +120,8 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(
 
 
 def test_hair_learns_to_move_in_a_minute(scene, tmp_path, monkeypatch):
-    """On motion and strands that it never saw, the network errs clearly less than hair carried rigidly. Of so little to learn, a step of
-    Muon, the default, takes more than three times as long.
+    """On motion and strands that it never saw, the network errs clearly less than hair carried rigidly. With so little to learn from,
+    Muon, the default, would take most of the time.
     """
     monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 8)
     messages = []
