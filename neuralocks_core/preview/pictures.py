@@ -18,6 +18,8 @@ from neuralocks_core.progress import Progress, silent
 SUFFIXES = (".png", ".mp4", ".gif")
 PANELS, MOST_PANELS = 6, 12
 """Pictures of a strip, spread over its frames, and the most frames that are all shown."""
+STRIP_SIZE, CLIP_SIZE = (440, 620), (480, 600)
+"""Width and height of one picture [pixels], if nobody asks for others."""
 STANDING = 4.0
 """Seconds that the camera takes to go round a single frame."""
 LETTERS = 10, 1 / 38
@@ -52,7 +54,7 @@ def render(
     Args:
         scene: what to draw.
         path: the file to write; its extension chooses the format.
-        size: width and height of one picture in pixels.
+        size: width and height of one picture in pixels; STRIP_SIZE or CLIP_SIZE if left out.
         frames: numbers of the scene's frames: a strip shows these, or PANELS of them if there are more than MOST_PANELS; a clip
             goes from the first to the last. If left out, a strip shows PANELS of all, a clip all.
         azimuth: where the camera is: degrees from the face to the character's left.
@@ -76,7 +78,7 @@ def render(
     if kind == ".gif":
         first = np.linspace(0, len(chosen) - 1, PALETTE).astype(int)
         chosen, seen_from = (np.concatenate([each[first], each]) for each in (chosen, seen_from))
-    width, height = size or ((440, 620) if still else (480, 600))
+    width, height = size or (STRIP_SIZE if still else CLIP_SIZE)
     # Single pictures keep the head in the middle; in a clip the camera lags behind, so that the body visibly moves.
     detail, calm = detail or (PICTURE if still else CLIP), 0.02 if still else 0.3
     say = progress or silent

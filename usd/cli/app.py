@@ -46,7 +46,7 @@ command("train")(train_command)
 command("import")(import_command)
 command("grow")(grow_command)
 command("body")(body_command)
-app.add_typer(rig_app, name="rig", help="Rigged mesh hair: train, bake, export.")
+app.add_typer(rig_app, name="rig", help="Rigged mesh hair: inspect, train, bake, evaluate, export.")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -163,7 +163,12 @@ def preview_command(
             show_default="six of all for a strip, all for a clip",
         ),
     ] = None,
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of one picture in pixels.")] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            help="WIDTHxHEIGHT of one picture in pixels.", show_default="440x620 for a strip, 480x600 for a clip"
+        ),
+    ] = None,
     view: Annotated[float, typer.Option(help="Degrees from the face to the character's left.")] = 32.0,
     turntable: Annotated[bool, typer.Option("--turntable", help="The camera goes round the character once.")] = False,
     groom: Grooms = None,

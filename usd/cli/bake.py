@@ -125,7 +125,8 @@ def simulate_command(
 ) -> None:
     """Bake with the slow reference solver instead of the network, to compare with (extra 'compare').
 
-    At the end it says how far from solved the steps were: the rms net force per mass that was left. XPBD solves for nothing.
+    At the end it says how far from solved the steps were: the rms net force per mass that was left; with
+    --xpbd it does not, because that solves no equations.
     """
     from ..baking.simulate import simulate
     from .progress import progress_bar

@@ -40,8 +40,8 @@ Materials = Annotated[
     list[str] | None,
     typer.Option(
         "--material",
-        help="NAME=VALUE, or NAME=2x for a factor. stiffness 0.0002..0.005 m^4/s^2, weight 0.5..2 (times gravity), "
-        "damping 4..20 /s, clumping 0..240 /s^2.",
+        help="NAME=VALUE, or NAME=2x for twice the default; repeat for more. stiffness 0.001 (0.0002..0.005) m^4/s^2, "
+        "weight 1 (0.5..2) times gravity, damping 10 (4..20) /s, clumping 60 (0..240) /s^2.",
     ),
 ]
 WindVector = Annotated[

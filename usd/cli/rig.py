@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`neuralocks rig`: train, bake, inspect and export rigged mesh hair."""
+"""`neuralocks rig`: inspect, train, bake, evaluate and export rigged mesh hair."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -29,7 +29,8 @@ app = typer.Typer(no_args_is_help=True, add_completion=False)
 command = command_of(app)
 
 Chains = Annotated[
-    list[str] | None, typer.Option(help="Name pattern of the first joints of hair chains, such as 'Hair*_1'.")
+    list[str] | None,
+    typer.Option(help="Name pattern of the first joints of hair chains, such as 'Hair*_1'; repeat for more."),
 ]
 ModelArgument = Annotated[Path | None, typer.Argument(help="Model file; the shipped one if left out.")]
 
@@ -80,7 +81,7 @@ def train(
     joint: Joints = None,
     as_json: AsJson = False,
 ) -> None:
-    """Train a tiny network for the hair joints of one rig. No data is needed."""
+    """Train a tiny network for the hair joints of one rig (extra 'train'). No data is needed."""
     from neuralocks_core import model as model_file
     from neuralocks_core.rig.report_text import report_lines
 

@@ -15,6 +15,7 @@ import typer
 
 from neuralocks_core import model as model_file
 from neuralocks_core.json_values import plain
+from neuralocks_core.preview.pictures import CLIP_SIZE, STRIP_SIZE
 from usd.assets.groom import write_groom
 from usd.assets.importing import import_groom
 from usd.baking.bake import bake
@@ -108,6 +109,13 @@ def test_help_breaks_its_lines_where_the_terminal_ends(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     assert status("bake", "--help") == 0
     assert "mute it to get the shot back. To resume a bake that was stopped, give" in capsys.readouterr().out
+
+
+def test_help_tells_the_sizes_of_pictures(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "300")
+    assert status("preview", "--help") == 0
+    strip, clip = ("x".join(map(str, size)) for size in (STRIP_SIZE, CLIP_SIZE))
+    assert f"[default: ({strip} for a strip, {clip} for a clip)]" in capsys.readouterr().out
 
 
 def test_the_version_is_told(capsys):
