@@ -81,7 +81,7 @@ def read_rig(
     weights = source.shape(list(knots), time_codes)
     used = weights.any(axis=0) | all_shapes
     knots = {name: own for (name, own), kept in zip(knots.items(), used, strict=True) if kept}
-    body = merged_body(meshes, to_bind, set(knots))
+    body = merged_body(meshes, to_bind, knots)
     character = Character(skeleton, body, humanoid)
     notes += backwards_notes(source, character)
     clip = Clip(

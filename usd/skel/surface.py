@@ -14,7 +14,7 @@ from neuralocks_core.skinned_body import Body
 from ..border.placement import Placement
 from ..border.values import as_numbers
 from .binding import bound_skeleton, geom_bind, in_effect, joint_influences, lineage, rest_value
-from .blend_shapes import Knots, at_knot, knot_weights, read_blend_shapes
+from .blend_shapes import Knots, at_knot, read_blend_shapes
 from .joints import JointSource
 
 
@@ -147,16 +147,14 @@ def _seen(switches: list[Usd.Attribute], time) -> bool:
     return all(switch.Get(time) != UsdGeom.Tokens.invisible for switch in switches)
 
 
-def merged_body(meshes: list[StageMesh], to_bind: np.ndarray, keep: set[str] | None = None) -> Body | None:
+def merged_body(meshes: list[StageMesh], to_bind: np.ndarray, knots: dict[str, list[float]]) -> Body | None:
     """All meshes as one Body.
 
     Args:
         meshes: what one skeleton skins.
         to_bind: authored bind space to bind world [m], (4, 4).
-        keep: blend shapes wanted; all if None. Each of their knots is a shape of the Body.
+        knots: those of the blend shapes wanted, see `knot_weights`. Each is a shape of the Body.
     """
-    knots = knot_weights([mesh.shapes for mesh in meshes])
-    knots = {name: own for name, own in knots.items() if keep is None or name in keep}
     return Body.joined([_body(mesh, to_bind, knots) for mesh in meshes])
 
 
