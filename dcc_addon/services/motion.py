@@ -55,13 +55,13 @@ def similar(joints: np.ndarray, subject: str = "armature") -> np.ndarray:
     return result
 
 
-def as_carried(head: np.ndarray, subject: str = "armature") -> np.ndarray:
+def as_carried(head: np.ndarray, subject: str) -> np.ndarray:
     """A world transform (4, 4) of the head as it carries hair: unchanged if it is scaled unevenly."""
     even = similar(head, subject)
     return head if uneven(head, even) else even
 
 
-def trim_of(bind: np.ndarray, subject: str = "armature") -> np.ndarray:
+def trim_of(bind: np.ndarray, subject: str) -> np.ndarray:
     """Per joint, the transform (J, 4, 4) that makes its bind transform a plain rotation and translation.
 
     Applied to bind and posed transforms alike it cancels; it keeps the scale of an object out of channels of half

@@ -11,7 +11,7 @@ _APART = 1e-6
 """Joints closer together than this share of the skeleton's size count as at the same place."""
 
 
-def below_first(first: int, end: int | None, keys, parents, positions, taken=()) -> tuple[int | None, int | None]:
+def below_first(first: int, end: int | None, keys, parents, positions, taken) -> tuple[int | None, int | None]:
     """Start and end joint of a limb's second bone; None if missing.
 
     Args:

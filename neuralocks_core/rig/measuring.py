@@ -32,7 +32,7 @@ class UnevenJoint(NeuralocksError):
 
 
 def measured_chains(
-    character: Character, tops: list[int], meshes: list[SkinnedMesh] | None, named: list[int] = ()
+    character: Character, tops: list[int], meshes: list[SkinnedMesh] | None, named: list[int]
 ) -> HairChains:
     """The chains that begin at these joints.
 

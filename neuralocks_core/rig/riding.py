@@ -11,7 +11,7 @@ NO_BONE = 1e-5
 """Shorter bones [m] have no direction."""
 
 
-def in_chains(character: Character, tops: list[int], drives: np.ndarray, named: list[int] = ()) -> np.ndarray:
+def in_chains(character: Character, tops: list[int], drives: np.ndarray, named: list[int]) -> np.ndarray:
     """Which joints (J,) bool are in these subtrees and do not ride on them, as deform joints do, and what is worn in hair, which is stiff
     or has an animation of its own, unless hair goes on from it, as from a tie.
 

@@ -17,8 +17,8 @@ NEARER = 1e-5
 MOST_SUBFRAMES = 64
 
 
-def parse_frames(text: str, frame: float = 1.0) -> tuple[float, float, float]:
-    """`FIRST:LAST[:STEP]` or a single `FIRST` as (first, last, step); the step is a frame if left out.
+def parse_frames(text: str, frame: float) -> tuple[float, float, float]:
+    """`FIRST:LAST[:STEP]` or a single `FIRST` as (first, last, step); the step is a frame, `frame` time codes, if left out.
 
     Raises:
         NeuralocksError: it is something else.

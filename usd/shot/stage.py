@@ -281,7 +281,7 @@ def _notes_on_motion(grooms: list[StageGroom]) -> list[str]:
     return notes
 
 
-def _rigs(stage, border, skeleton, head, path, *, joints=None, **options) -> tuple[list[StageRig], list[str]]:
+def _rigs(stage, border, skeleton, head, path, *, joints, **options) -> tuple[list[StageRig], list[str]]:
     """The skeletons that can be used, and the notes on those that cannot."""
     prims = find_skeletons(stage, skeleton)
     if not prims:
