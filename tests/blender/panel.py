@@ -34,6 +34,15 @@ def drawn(icon: str = "") -> list[str]:
     return shown(draw, icon)
 
 
+def told_changed(remedy: str = "Bake and Attach") -> list[str]:
+    """What the panel says was changed since a bake, and can be renewed by `remedy`."""
+    lines = " ".join(drawn()).replace("Changed since", "\nChanged since").replace(" again", " again\n").splitlines()
+    notes = [line.split("shows it as it was: ")[1] for line in lines if "shows it as it was: " in line]
+    found = [note.split("; ") for note in notes]
+    assert all(ending == f"press {remedy} again" for _, ending in found), notes
+    return [part for parts, _ in found for part in parts.split(", ")]
+
+
 def preferences() -> list[str]:
     """Everything that the add-on's preferences say now."""
     addons = bpy.context.preferences.addons

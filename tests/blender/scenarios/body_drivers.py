@@ -7,7 +7,7 @@ import bpy
 
 from tests.blender import scenes
 from tests.blender.checks import make_live, needs_usd
-from tests.blender.panel import drawn
+from tests.blender.panel import told_changed
 
 
 def driven_since(folder: Path) -> None:
@@ -19,7 +19,7 @@ def driven_since(folder: Path) -> None:
     make_live(rig, bpy.data.objects["Hair"])
     scene = bpy.context.scene
     scene.neuralocks.output = str(folder / "hair.usdc")
-    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     rig, skin = bpy.data.objects["Rig"], bpy.data.objects["Body"]
@@ -37,17 +37,17 @@ def driven_since(folder: Path) -> None:
             setattr(owner, name, value)
             # A key that nothing drives any longer is part of the body's shape.
             parts = [] if value == before else ["body"] * (name == "mute") + ["drivers of the body"]
-            assert _told() == parts, (name, _told())
+            assert told_changed() == parts, (name, told_changed())
     rig.name = rig.data.name = skin.name = skin.data.name = "Another"
     skin.data.shape_keys.key_blocks["Driven"].name = "Frown"
     rig.data.bones["neck"].name = "Throat"
-    assert not _told(), _told()
+    assert not told_changed(), told_changed()
     curve.driver.expression = "0.5 * var"
     bpy.context.view_layer.update()
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
-    assert _told() == ["drivers of the body"]
-    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+    assert told_changed() == ["drivers of the body"]
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
 
 
 def drivers_told(_folder: Path) -> None:
@@ -73,10 +73,3 @@ def drivers_told(_folder: Path) -> None:
         found = number_of_drivers(skin.data)
         assert found not in seen, len(seen)
         seen.append(found)
-
-
-def _told() -> list[str]:
-    """The parts that the panel says were changed since the hair was attached."""
-    bpy.context.view_layer.update()
-    said = " ".join(drawn())
-    return said.split("shows it as it was: ")[1].split("; ")[0].split(", ") if "as it was" in said else []

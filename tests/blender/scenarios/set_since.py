@@ -12,7 +12,7 @@ from dcc_addon.scene import as_groomed
 from dcc_addon.services.sliders import SLIDERS
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, bones_at, choose, give_bone_model, make_live, needs_usd
-from tests.blender.panel import drawn
+from tests.blender.panel import told_changed
 
 
 def character_set_since(folder: Path) -> None:
@@ -29,13 +29,13 @@ def character_set_since(folder: Path) -> None:
         breathing.value = frame / 24
         breathing.keyframe_insert("value", frame=frame)
     scene.neuralocks.output = str(folder / "hair.usdc")
-    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     strands, body, scene = (*map(bpy.data.objects.get, ("Hair", "Body")), bpy.context.scene)
     own, mesh = strands.neuralocks_hair.armature.neuralocks_character, body.data
     fat, (curve,) = mesh.shape_keys.key_blocks["Fat"], scenes.fcurves(mesh.shape_keys)
-    assert not _told()
+    assert not told_changed()
     basis = mesh.shape_keys.reference_key.data
     slim = [point.co.copy() for point in basis]
 
@@ -69,37 +69,37 @@ def character_set_since(folder: Path) -> None:
         for edit in edits:
             for on in (True, False):
                 edit(on)
-                assert _told() == ([what] if on else []), (what, edits.index(edit), on, _told())
+                assert told_changed() == ([what] if on else []), (what, edits.index(edit), on, told_changed())
     if bpy.app.version >= (4, 0):  # without a window, older ones keep no undo steps
         assert bpy.ops.ed.undo_push(message="before") == {"FINISHED"}
         own.loop, fat.value = True, 1.0
-        assert bpy.ops.ed.undo_push(message="after") == {"FINISHED"} and _told() == ["Loop", "body"]
-        assert bpy.ops.ed.undo() == {"FINISHED"} and not _told()
+        assert bpy.ops.ed.undo_push(message="after") == {"FINISHED"} and told_changed() == ["Loop", "body"]
+        assert bpy.ops.ed.undo() == {"FINISHED"} and not told_changed()
         strands, body, scene = (*map(bpy.data.objects.get, ("Hair", "Body")), bpy.context.scene)
         own, mesh = strands.neuralocks_hair.armature.neuralocks_character, body.data
         fat = mesh.shape_keys.key_blocks["Fat"]
     own.head_bone, own.body = "head", body
     body.name, fat.name, mesh.name = "Skin", "Thick", "Skin"
-    assert not _told(), "chosen is what was found, and a name is no shape"
+    assert not told_changed(), "chosen is what was found, and a name is no shape"
     for frame in (3, 9):
         scene.frame_set(frame)
-        assert not _told(), "the cache shows what is keyed"
+        assert not told_changed(), "the cache shows what is keyed"
     others = [each for each in scene.collection.objects if each.type == "MESH"]
     for each in others:
         scene.collection.objects.unlink(each)
-    assert not _told(), "where hair was appended alone, nobody changed a body"
+    assert not told_changed(), "where hair was appended alone, nobody changed a body"
     for each in others:
         scene.collection.objects.link(each)
     body.vertex_groups[0].add(range(len(mesh.vertices)), 0.5, "REPLACE")
-    assert _told() == ["body"]
+    assert told_changed() == ["body"]
     _record_as_older(strands, 4)
     own.loop = True
-    assert not _told()
+    assert not told_changed()
     strands.location.x += 0.1
-    assert _told() == ["place"]
-    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+    assert told_changed() == ["place"]
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
     own.loop = False
-    assert _told() == ["Loop"]
+    assert told_changed() == ["Loop"]
 
 
 def model_moved_since(folder: Path) -> None:
@@ -117,24 +117,24 @@ def model_moved_since(folder: Path) -> None:
         make_live(rig, strands)
         own, scene = strands.neuralocks_hair, bpy.context.scene
         own.live, own.model, scene.neuralocks.output = False, "//own.neuralocks", str(folder / "hair.usdc")
-        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
         if parts:
             _record_as_older(strands, parts)
-        assert not _told()
+        assert not told_changed()
         bpy.ops.wm.save_as_mainfile(filepath=str(there / "shot.blend"))
-        assert own.model == "//../own.neuralocks" and not _told(), parts
+        assert own.model == "//../own.neuralocks" and not told_changed(), parts
         bpy.ops.wm.open_mainfile(filepath=str(there / "shot.blend"))
         own = bpy.data.objects["Hair"].neuralocks_hair
-        assert not _told(), parts
+        assert not told_changed(), parts
         model.rename(folder / "away.neuralocks")
-        assert not _told(), "a model that is missing here is no other one"
+        assert not told_changed(), "a model that is missing here is no other one"
         (folder / "away.neuralocks").rename(model)
         own.resolve = not own.resolve
-        assert _told() == ["sliders"]
+        assert told_changed() == ["sliders"]
         own.resolve = not own.resolve
         for other, what in (("", ["Model"]), (str(model), [])):
             own.model = other
-            assert _told() == what
+            assert told_changed() == what
 
 
 def _record_as_older(strands, parts: int) -> None:
@@ -154,17 +154,17 @@ def keys_set_since(folder: Path) -> None:
     scenes.dance(rig)
     give_bone_model(rig, folder)
     operators, own, scene = bpy.ops.neuralocks, rig.neuralocks_character, bpy.context.scene
-    assert operators.bake_keys() == {"FINISHED"} and not _told("Bake to Keyframes")
+    assert operators.bake_keys() == {"FINISHED"} and not told_changed("Bake to Keyframes")
     (folder / "later").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     own.rig_model = "//rig.neuralocks"
-    assert not _told("Bake to Keyframes")
+    assert not told_changed("Bake to Keyframes")
     if bpy.app.version < (4, 0):
         raise SkipTest("this Blender does not tell where it saves to")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "later" / "shot.blend"))
-    assert not _told("Bake to Keyframes") and own.rig_model == "//../rig.neuralocks", "the same model"
+    assert not told_changed("Bake to Keyframes") and own.rig_model == "//../rig.neuralocks", "the same model"
     (folder / "rig.neuralocks").rename(folder / "away.neuralocks")
-    assert not _told("Bake to Keyframes"), "a model that is missing here is no other one"
+    assert not told_changed("Bake to Keyframes"), "a model that is missing here is no other one"
     (folder / "away.neuralocks").rename(folder / "rig.neuralocks")
     keyed, model = bones_at(rig, 9), own.rig_model
     settings = {
@@ -179,39 +179,25 @@ def keys_set_since(folder: Path) -> None:
     for what, (owner, name, other, before) in settings.items():
         for value in (other, before):
             setattr(owner, name, value)
-            assert _told("Bake to Keyframes") == ([what] if value == other else [])
+            assert told_changed("Bake to Keyframes") == ([what] if value == other else [])
     own.rig_motion, own.wind, own.loop = 0.5, 6.0, True
-    assert _told("Bake to Keyframes") == ["Motion", "wind", "Loop"] and apart(bones_at(rig, 9), keyed) == 0.0
+    assert told_changed("Bake to Keyframes") == ["Motion", "wind", "Loop"] and apart(bones_at(rig, 9), keyed) == 0.0
     assert operators.sample_motion() == {"FINISHED"}
     own.rig_live = True
-    assert not _told("Bake to Keyframes")
+    assert not told_changed("Bake to Keyframes")
     live = bones_at(rig, 9)
     own.rig_live = False
     track = rig.animation_data.nla_tracks["Neuralocks Hair"]
     for mute in (True, False):
         track.mute = mute
-        assert bool(_told("Bake to Keyframes")) != mute
-    assert operators.bake_keys() == {"FINISHED"} and not _told("Bake to Keyframes")
+        assert bool(told_changed("Bake to Keyframes")) != mute
+    assert operators.bake_keys() == {"FINISHED"} and not told_changed("Bake to Keyframes")
     assert apart(bones_at(rig, 9), live) < SAME < apart(live, keyed)
     own.wind = 0.0
-    assert _told("Bake to Keyframes") == ["wind"]
+    assert told_changed("Bake to Keyframes") == ["wind"]
     del rig.animation_data.nla_tracks["Neuralocks Hair"].strips[0].action["neuralocks_keyed"]
-    assert not _told("Bake to Keyframes")
-    assert operators.remove_keys() == {"FINISHED"} and not _told("Bake to Keyframes")
-
-
-def _told(remedy: str = "Bake and Attach") -> list[str]:
-    """What the panel says was changed since a bake, and can be renewed so."""
-    bpy.context.view_layer.update()
-    notes = [line.split("shows it as it was: ")[1] for line in _lines() if "shows it as it was: " in line]
-    found = [note.split("; ") for note in notes]
-    assert all(ending == f"press {remedy} again" for _, ending in found), notes
-    return [part for parts, _ in found for part in parts.split(", ")]
-
-
-def _lines() -> list[str]:
-    """The notes, which the panel breaks into lines."""
-    return " ".join(drawn()).replace("Changed since", "\nChanged since").replace(" again", " again\n").splitlines()
+    assert not told_changed("Bake to Keyframes")
+    assert operators.remove_keys() == {"FINISHED"} and not told_changed("Bake to Keyframes")
 
 
 def _fatten(body, name: str = "Fat"):
@@ -238,21 +224,21 @@ def body_edited_since(folder: Path) -> None:
             _fatten(body).value = 1.0
         choose(body)
         bpy.context.scene.neuralocks.output = str(folder / "hair.usdc")
-        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not _told()
+        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
         body.vertex_groups.new(name="pin").add([0, 1], 1.0, "REPLACE")  # of cloth, say: it moves nothing
         rig.data.bones["head"].name = "Skull"
         bpy.context.view_layer.update()
-        assert not _told()
+        assert not told_changed()
         rig.data.bones["Skull"].name = "head"
         for wide in (False, True):
             bpy.ops.object.mode_set(mode="EDIT")
-            assert not _told()
+            assert not told_changed()
             bpy.ops.mesh.select_all(action="SELECT")
             if wide:
                 bpy.ops.transform.resize(value=(1.3, 1.0, 1.0))
-            assert not _told()
+            assert not told_changed()
             bpy.ops.object.mode_set(mode="OBJECT")
-            assert _told() == (["body"] if wide else [])
+            assert told_changed() == (["body"] if wide else [])
         bpy.ops.object.mode_set(mode="EDIT")
-        assert _told() == ["body"]
+        assert told_changed() == ["body"]
         bpy.ops.object.mode_set(mode="OBJECT")

@@ -8,7 +8,7 @@ from mathutils import Matrix
 
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, choose, give_bone_model, make_live, needs_usd, points_at
-from tests.blender.panel import drawn
+from tests.blender.panel import drawn, told_changed
 
 
 def retimed_since(folder: Path) -> None:
@@ -155,36 +155,31 @@ def groomed_since(folder: Path) -> None:
     def blow(hair) -> None:
         hair.neuralocks_hair.armature.neuralocks_character.wind = 3.0
 
-    def told() -> list[str]:
-        bpy.context.view_layer.update()
-        said = " ".join(drawn())
-        return said.split("shows it as it was: ")[1].split("; ")[0].split(", ") if "as it was" in said else []
-
     for edit, what in ((comb, "groom"), (push, "place"), (stiffen, "sliders"), (blow, "wind")):
-        assert operators.bake_attach() == {"FINISHED"} and not told()
+        assert operators.bake_attach() == {"FINISHED"} and not told_changed()
         edit(bpy.data.objects["Hair"])
-        assert told() == [what]
+        assert told_changed() == [what]
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
         bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
-        assert told() == [what]
+        assert told_changed() == [what]
     hair = bpy.data.objects["Hair"]
-    assert operators.bake_attach() == {"FINISHED"} and not told()
+    assert operators.bake_attach() == {"FINISHED"} and not told_changed()
     hair.parent.name = hair.name = "Another"
-    assert not told(), "a name is no place"
+    assert not told_changed(), "a name is no place"
     choose(hair)
     bpy.ops.object.duplicate()
     bpy.context.scene.neuralocks.hair = bpy.context.object
-    assert bpy.context.object != hair and not told()
+    assert bpy.context.object != hair and not told_changed()
     bpy.data.objects.remove(bpy.context.object)
     bpy.context.scene.neuralocks.hair = hair
     hair.neuralocks_hair.armature.neuralocks_character.wind = 2.0
-    assert told() == ["wind"]
+    assert told_changed() == ["wind"]
     hair.neuralocks_hair.live = True
-    assert not told()
+    assert not told_changed()
     hair.neuralocks_hair.live = False
-    assert told() == ["wind"]
+    assert told_changed() == ["wind"]
     hair["neuralocks_groomed"] = 7
-    assert not told()
+    assert not told_changed()
     assert operators.detach() == {"FINISHED"} and "neuralocks_groomed" not in hair
 
 
