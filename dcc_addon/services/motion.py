@@ -209,7 +209,11 @@ class Motion:
 
 
 def frame_numbers(start: int, end: int, subframes: int) -> np.ndarray:
-    """Frames to sample from `start` to `end`, `subframes` per frame except the last, which has one, (T,)."""
+    """Frames to sample from `start` to `end`, `subframes` per frame except the last, which has one, (T,).
+
+    Raises:
+        NeuralocksError: the range ends before it starts.
+    """
     if end < start:
         raise NeuralocksError(f"frame range: it ends at {end}, before its start {start}; set an end after the start")
     return start + np.arange((end - start) * subframes + 1) / subframes

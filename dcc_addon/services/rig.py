@@ -69,7 +69,11 @@ class RigArrays:
         return found
 
     def by_hand(self) -> dict[str, str]:
-        """The joint map given by the artist."""
+        """The joint map given by the artist.
+
+        Raises:
+            NeuralocksError: the rig has no bone of the name chosen.
+        """
         if not self.head_bone:
             return {}
         if self.head_bone not in self.bones:

@@ -131,7 +131,11 @@ def bake(
 
 
 def as_material(material) -> Material:
-    """A Material from a Material, from words NAME=VALUE, or from a dict of them."""
+    """A Material from a Material, from words NAME=VALUE, or from a dict of them.
+
+    Raises:
+        NeuralocksError: it is something else, or a word is not one of `Material.parse`.
+    """
     if isinstance(material, Material):
         return material
     if isinstance(material, dict):

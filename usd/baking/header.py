@@ -51,6 +51,9 @@ def relative(file, out: Path) -> str:
 
     USD resolves a shot's references from the shot's own folder, not from where a link in its path leads. If the folder's own path
     contains a link, `..` must lead to the file both from the link and from its target.
+
+    Raises:
+        NeuralocksError: the file's path has a control character, or the layer's a backslash that USD would read as a slash.
     """
     if any(unicodedata.category(letter) == "Cc" for letter in str(file)):
         raise NeuralocksError(

@@ -83,7 +83,11 @@ def joint_influences(prim: Usd.Prim, count: int, source: JointSource) -> tuple[n
 
 
 def geom_bind(prim: Usd.Prim) -> np.ndarray:
-    """Transform (4, 4) from the prim's points to authored bind space."""
+    """Transform (4, 4) from the prim's points to authored bind space.
+
+    Raises:
+        NeuralocksError: it is not finite, or flat.
+    """
     authored = in_effect(prim, "primvars:skel:geomBindTransform")
     matrix = np.eye(4)
     if authored:

@@ -124,7 +124,11 @@ class JointSource:
         return () if self._animation is None else _names(self._animation.GetBlendShapesAttr())
 
     def shape(self, names, time_codes) -> np.ndarray:
-        """Blend shape weights (T, B) of the named shapes at time codes (T,); 0 where the animation has none."""
+        """Blend shape weights (T, B) of the named shapes at time codes (T,); 0 where the animation has none.
+
+        Raises:
+            NeuralocksError: the animation has another number of weights than of shapes, or one that is not finite.
+        """
         result = np.zeros((len(time_codes), len(names)))
         order = self.shape_names
         wanted = [(column, order.index(name)) for column, name in enumerate(names) if name in order]
@@ -225,7 +229,11 @@ class JointSource:
         return None
 
     def local(self, time_codes) -> np.ndarray:
-        """Joints (T, J, 4, 4) relative to their parents at time codes (T,)."""
+        """Joints (T, J, 4, 4) relative to their parents at time codes (T,).
+
+        Raises:
+            NeuralocksError: the animation has no value for each of its joints, or one that is no transform.
+        """
         result = np.broadcast_to(self.rest, (len(time_codes), *self.rest.shape)).copy()
         if self._columns is None:
             return result
