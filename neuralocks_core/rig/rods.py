@@ -42,7 +42,7 @@ class RodTree:
     def __init__(self, chains: HairChains, material: RigMaterial):
         lengths, bones = chains.lengths, len(chains.bones)
         total = lengths.sum()
-        below = [np.flatnonzero(chains.bone_joint == end) if end >= 0 else [] for end in chains.bone_end]
+        below = [np.flatnonzero(chains.bone_joint == end) for end in chains.bone_end]  # none at a free end, which is -1
         self.mass = np.array([(lengths[b] + lengths[below[b]].sum()) / 2 for b in range(bones)]) / total
         to_joint = {int(end): b for b, end in enumerate(chains.bone_end) if end >= 0}
         own = np.array([lengths[chains.bone_joint == j].mean() for j in range(len(chains))])

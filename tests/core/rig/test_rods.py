@@ -25,6 +25,22 @@ def test_a_rod_of_two_bones_is_what_it_is_by_hand(way, supported):
     assert not RodTree(chains, RigMaterial(rest_support=False)).support.any()
 
 
+def test_bones_of_unlike_lengths_that_branch_are_what_they_are_by_hand():
+    """A bone that hangs, two level ones at its end, and one that hangs from each of these: what level bones bear is held up."""
+    places = {"a": (0, 1.6, 0), "b": (0, 1.5, 0), "c": (0, 1.5, 0.2), "d": (0.4, 1.5, 0)}
+    rows = [(name, over, places[name]) for name, over in zip("abcd", ("head", "a", "b", "b"))]
+    ends = [("c_end", "c", (0, 1.2, 0.2)), ("d_end", "d", (0.4, 1.0, 0))]
+    chains = find_chains(character([*rows, *ends]), patterns=["a"])
+    rod = RodTree(chains, RigMaterial(bend=0.02))
+    np.testing.assert_allclose(chains.lengths, [0.1, 0.2, 0.4, 0.3, 0.5])
+    mass = np.array([0.1 + 0.2 + 0.4, 0.2 + 0.3, 0.4 + 0.5, 0.3, 0.5]) / 2 / 1.5
+    np.testing.assert_allclose(rod.mass, mass)
+    beside = np.array([0.1, 0.1 + (0.2 + 0.4) / 2, 0.2 + 0.3, 0.4 + 0.5]) / 2
+    np.testing.assert_allclose(rod.stiffness, 0.02 / beside / 1.5)
+    borne = G * np.array([0, mass[1] + mass[3], mass[2] + mass[4], 0, 0])
+    np.testing.assert_allclose(rod.support, np.outer(borne, [0, 1, 0]), atol=1e-12)
+
+
 def test_a_chain_is_as_long_as_its_longest_branch():
     fork = [
         *tail("long", 4, at=(0.05, 1.44, 0), parent="hair_2"),
