@@ -67,7 +67,7 @@ def spring_bones(
             new = now + (now - previous[:, joints]) * (1 - drag) + axis * stiffness * step
             new = _at_length(origin, new + np.array([0.0, -1.0, 0.0]) * gravity * step, lengths[joints])
             previous[:, joints], tail[:, joints] = now, new
-            local = np.einsum("cnji,cnj->cni", carrier, new - origin) / lengths[joints]
+            local = np.einsum("cnji,cnj->cni", carrier, new - origin)
             turn = quaternion_between(bones[joints], local)
             result[:, frame, joints] = turn = turn / np.linalg.norm(turn, axis=-1, keepdims=True)
             world[:, joints + 1] = carrier @ from_quaternion(turn)

@@ -77,6 +77,17 @@ def test_spring_bones_follow_those_above_them_in_the_same_frame():
             assert ours.apply(chains.bones[joint]) == pytest.approx(parent.apply(axis[joint]), abs=1e-6)
 
 
+def test_where_a_head_stands_and_which_way_it_faces_changes_nothing():
+    """Gravity is along the axis about which it faces another way."""
+    heads, placed, settings = np.tile(np.eye(4), (1, 12, 1, 1)), np.eye(4), SpringSettings(0.5, 0.3, 0.4)
+    heads[0, :, :3, 3] = np.outer(np.sin(np.arange(12)), [0.1, 0.05, -0.1])
+    placed[:3, :3], placed[:3, 3] = Rotation.from_rotvec([0, 2.0, 0]).as_matrix(), [3.0, 1.6, -5.0]
+    here, there = (spring_bones(forked(), each, 1 / 30, settings) for each in (heads, placed @ heads))
+    np.testing.assert_allclose(there, here, atol=1e-5)
+    assert np.abs(here[..., 1:]).max() > 0.05
+    np.testing.assert_allclose(np.linalg.norm(here, axis=-1), 1, atol=1e-6)
+
+
 def test_each_clip_may_have_settings_of_its_own():
     heads, few = np.tile(np.eye(4), (2, 12, 1, 1)), [SpringSettings(0.3, 0.15, 0.6), SpringSettings(2.5, 0.4, 0.0)]
     heads[:, :, 0, 3] = 0.2 * np.sin(np.arange(12))
