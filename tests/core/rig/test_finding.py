@@ -81,17 +81,25 @@ def test_a_chain_of_controls_goes_on_through_offsets_and_leaf_bones(patterns, le
     assert list(placed_chains(chains, who).parents) == [-1, 0, 1]
 
 
-@pytest.mark.parametrize("share", [0.25, 0.5])
-def test_twist_joints_ride_on_the_bone_that_they_lie_on(share):
-    """Turned by themselves, they would tear the skin off the next joint."""
+@pytest.mark.parametrize("patterns", [None, ["hair_control"], ["hair_1"]])
+def test_a_chain_below_a_control_at_its_place_begins_with_its_own_first_joint(patterns):
+    """That joint goes on, so it does not ride on the control."""
+    who = character([("hair_control", "head", (0, 1.6, -0.1)), *tail("hair", 4, parent="hair_control")])
+    skins = {f"hair_{i}": np.eye(3) * 0.02 + [0, 1.66 - 0.06 * i, -0.1] for i in (1, 2, 3)}
+    assert find_chains(who, [skin(who, skins)], patterns).names == ("hair_1", "hair_2", "hair_3")
+
+
+@pytest.mark.parametrize(("share", "side"), [(0.25, "hair_side"), (0.5, "hair_side"), (0.5, "twisted_lock")])
+def test_twist_joints_ride_on_the_bone_that_they_lie_on(share, side):
+    """Turned by themselves, they would tear the skin off the next joint; one that lies beside the bone is a lock, whatever its name."""
     rows = tail("hair", 4)
     at = [np.array(place) for _, _, place in rows]
     twists = [(f"hair_{i + 1}_twist", f"hair_{i + 1}", tuple(at[i] + share * (at[i + 1] - at[i]))) for i in (0, 1)]
-    beside = ("hair_side", "hair_2", tuple(at[1] + [0.001, -0.02, 0]))
-    who = character([*rows, *twists, beside, ("hair_side_end", "hair_side", tuple(at[1] + [0.02, -0.06, 0]))])
-    names = ("hair_1", "hair_2", "hair_3", "hair_1_twist", "hair_2_twist", "hair_side")
+    beside = (side, "hair_2", tuple(at[1] + [0.001, -0.02, 0]))
+    who = character([*rows, *twists, beside, (f"{side}_end", side, tuple(at[1] + [0.02, -0.06, 0]))])
+    names = ("hair_1", "hair_2", "hair_3", "hair_1_twist", "hair_2_twist", side)
     skins = {name: np.eye(3) * 0.02 + [0, 1.5, -0.1] for name in names}
-    assert find_chains(who, [skin(who, skins)]).names == ("hair_1", "hair_2", "hair_3", "hair_side")
+    assert find_chains(who, [skin(who, skins)]).names == ("hair_1", "hair_2", "hair_3", side)
 
 
 @pytest.mark.parametrize("tie", ["hair_tie", "HairBand_L", "ribbon_1", "flower"])
