@@ -10,6 +10,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import find_chains
 from tests.core.rig.builders import character, skin, tail
 
+ALONG, ASIDE = np.array([0, -0.06, -0.01]), np.array([0.06, 0, 0])
+
 
 def test_an_end_joint_may_have_an_end_of_its_own():
     """FBX exporters add leaf bones to whatever is last: the bone still ends at the rig's own end joint."""
@@ -61,11 +63,13 @@ def test_of_two_ends_the_one_ahead_is_the_bones():
     )
 
 
-def test_a_bone_without_length_is_told_with_the_joint_at_its_place():
-    rows = tail("hair", 4)
+@pytest.mark.parametrize("alone", [False, True])
+def test_a_bone_without_length_is_told_with_the_joint_at_its_place(alone):
+    """Beside a bone that has one, and where the chain goes on only there."""
+    rows = tail("hair", 2 if alone else 4)
     who = character([*rows, ("hair_b", "hair_2", rows[1][2]), ("hair_c", "hair_b", tuple(np.add(rows[1][2], 0.05)))])
     points = np.eye(3) * 0.02
-    names = ("hair_1", "hair_2", "hair_3", "hair_b", "hair_c")
+    names = ("hair_1", "hair_2", "hair_b", "hair_c") if alone else ("hair_1", "hair_2", "hair_3", "hair_b", "hair_c")
     with pytest.raises(NeuralocksError, match="'hair_2' has no length \\('hair_b' lies at the same place"):
         find_chains(who, [skin(who, dict.fromkeys(names, points))])
 
@@ -120,3 +124,36 @@ def test_an_end_marker_of_hair_that_turns_is_believed(down):
     along = np.array([[0.1], [0.1 if any(down) else 0.5], [0.9]])
     mesh = skin(who, {"hair_1": [[0, 1.57, -0.105]] * 3, "hair_2": tip + aside * along + np.outer(down, [0, 1, 0])})
     np.testing.assert_allclose(find_chains(who, [mesh]).bones[1], aside, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("end", "sheet", "believed"),
+    [
+        (ALONG, [0.6 * ASIDE, 0.9 * ASIDE, 0.3 * ALONG], True),
+        (ASIDE, [0.3 * ASIDE, 0.4 * ASIDE, 0.3 * ALONG], True),
+        (ASIDE, [0.4 * ASIDE, 0.6 * ALONG, 0.9 * ALONG], False),
+        (ASIDE, [0.6 * ASIDE, 0.6 * ALONG, 0.9 * ALONG], True),
+    ],
+    ids=["ahead", "where the skin goes", "elsewhere", "elsewhere, with skin halfway there"],
+)
+def test_an_end_marker_is_believed_ahead_and_along_the_skin_and_on_it(end, sheet, believed):
+    """Of a bone whose skin goes aside, goes less than half the way, or spreads."""
+    who = character([*tail("hair", 2), ("hair_2_end", "hair_2", tuple(np.array([0, 1.54, -0.11]) + end))])
+    skins = {"hair_1": [[0, 1.57, -0.105]] * 3, "hair_2": np.array([0, 1.54, -0.11]) + sheet}
+    (bone,) = find_chains(who, [skin(who, skins)]).bones[1:]
+    np.testing.assert_allclose(bone, end if believed else 0.9 * ALONG, atol=1e-9)
+
+
+def test_the_bone_of_a_single_joint_points_where_its_skin_is_and_others_go_straight_on():
+    sheet = np.array([0.02, 0.05, 0.1])[:, None] * [1, 0, 0.2]
+    alone = character(tail("hair", 1))
+    bones = find_chains(alone, [skin(alone, {"hair_1": [0, 1.6, -0.1] + sheet})]).bones
+    np.testing.assert_allclose(bones, [sheet[-1]], atol=1e-12)
+    last = character(tail("hair", 2))
+    skins = {
+        "hair_1": [[0, 1.57, -0.105]] * 3,
+        "hair_2": [0, 1.54, -0.11] + np.array([[0.5], [1], [2]]) * ALONG + sheet,
+    }
+    along = ALONG / np.linalg.norm(ALONG)
+    bones = find_chains(last, [skin(last, skins)]).bones
+    np.testing.assert_allclose(bones[1], (2 * ALONG + sheet[-1]) @ along * along, atol=1e-12)

@@ -40,8 +40,13 @@ def test_bad_rigs_are_refused(extra, patterns, words):
 
 
 def test_a_mirrored_or_unevenly_scaled_joint_is_refused():
-    """Rotations cannot be written for them."""
+    """Rotations cannot be written for them; a joint of another size as a whole is fine."""
     who = character(tail("hair", 3))
+    plain = find_chains(who)
+    for size in (0.01, 100):
+        bind = who.skeleton.bind @ np.diag([size, size, size, 1])
+        scaled = find_chains(Character(Skeleton(who.skeleton.names, who.skeleton.parents, bind)))
+        np.testing.assert_allclose(scaled.axes, plain.axes, atol=1e-9)
     for scale, words in (((-1, 1, 1), "mirrored"), ((1, 2, 1), "unevenly scaled")):
         bind = who.skeleton.bind.copy()
         bind[-2, :3, :3] = np.diag(scale)
