@@ -24,6 +24,10 @@ def test_onnx_agrees_with_numpy(kind):
     ours = model.evaluate(features)
     session = ort.InferenceSession(rig_graph(model), providers=["CPUExecutionProvider"])
     assert np.abs(ours - session.run(None, {"features": features})[0]).max() < 1e-6
+    assert [given.shape for given in (*session.get_inputs(), *session.get_outputs())] == [
+        ["avatars", model.inputs],
+        ["avatars", len(model.chains), 4],
+    ]
     assert np.abs(np.linalg.norm(ours, axis=-1) - 1).max() < 1e-6
 
 
@@ -134,6 +138,8 @@ def test_layers_and_limits_that_do_not_fit_are_refused():
         (((first[:, 1:], bias), *others), "layers do not fit together"),
         (((first, bias[1:]), *others), "layers do not fit together"),
         (((first, bias), *others, *others), "layers do not fit together"),
+        (((first[:, :, None], bias), *others), "layers do not fit together"),
+        (((first[0], bias), *others), "layers do not fit together"),
         (((first, bias),), "does not give three numbers per hair joint"),
         (((first * np.nan, bias), *others), "NaN or infinity in its weights"),
         (((first, bias + np.inf), *others), "NaN or infinity in its weights"),
@@ -148,6 +154,7 @@ def test_layers_and_limits_that_do_not_fit_are_refused():
     for damage in (
         {"limits": model.limits[1:]},
         {"limits": np.nan * model.limits},
+        {"limits": np.where(np.arange(model.inputs), model.limits, np.inf)},
         {"limits": -model.limits},
         {"max_angle": 0.0},
         {"max_angle": 3.2},
