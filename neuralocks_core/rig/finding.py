@@ -156,7 +156,7 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
             f"--chains {' '.join(patterns)}: no joint has such a name; see neuralocks inspect for their names"
         )
     inside = [joint for joint in hits if character.of_head[joint] and joint not in character.heads]
-    if not inside and hits == [character.head]:
+    if hits == [character.head]:
         raise NeuralocksError(
             f"--chains {' '.join(patterns)}: joint '{leaf(names[character.head])}' is the head; name the first joints of the hair, "
             "which hang below it"
@@ -204,7 +204,7 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
         worn = worn or says_face(names[joint]) and not hair
         below = [(child, worn) for child in children[joint]]
         # A holder that drives nothing is not a hair bone: its children are. Without meshes, only a fan reveals a holder.
-        if (not used[joint] and below and not steered) if meshes else len(below) > 1:
+        if (not used[joint] and not steered) if meshes else len(below) > 1:
             todo += below
             continue
         strange = meshes and len(tree) > 1 and not body[tree].any() and not any(says_face(names[j]) for j in tree)

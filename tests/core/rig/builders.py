@@ -81,6 +81,24 @@ def skin(who: Character, joints: dict[str, tuple]) -> SkinnedMesh:
     return SkinnedMesh("mesh", points, triangles, indices, np.ones_like(indices, float))
 
 
+def steered(leaf, next_leaf=True):
+    """A chain of three controls, each with a joint at its own place that drives its bone's skin, and that skin."""
+    rows, skins = [], {}
+    for i, (name, parent, place) in enumerate(tail("phys", 3)):
+        rows += [(name, parent, place), (f"{leaf}_{i + 1}", name, place if i != 1 or next_leaf else (0, 1.5, -0.2))]
+        skins[f"{leaf}_{i + 1}"] = [place, np.add(place, (0, -0.03, -0.005)), np.add(place, (0, -0.06, -0.01))]
+    return character(rows), skins
+
+
+def ring(who: Character, joint: str, size=1.0) -> SkinnedMesh:
+    """Skin around the head, which a joint drives."""
+    points = np.stack([np.cos(np.arange(12)), np.full(12, 1.65), np.sin(np.arange(12))], axis=-1)
+    mesh = skin(who, {joint: points[:3]})
+    indices = np.full((12, 1), mesh.joint_indices[0, 0])
+    points = points * [0.1 * size, 1, 0.1 * size]
+    return replace(mesh, points=points, joint_indices=indices, joint_weights=np.ones((12, 1)), triangles=[])
+
+
 def random_model(joints=(4, 4, 4, 4), hidden=16, seed=0, spec: BoundarySpec | None = None) -> RigModel:
     """Chains of these lengths and a network of random weights, without a trained meaning."""
     rows = []

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Chains that may be hair, beside those that names tell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from neuralocks_core.rig import find_chains
 from neuralocks_core.rig.finding import left_out
-from tests.core.rig.builders import character, skin, tail
+from tests.core.rig.builders import character, ring, skin, tail
 
 
 def test_rows_of_joints_that_no_name_tells_are_left_out():
@@ -66,3 +68,18 @@ def test_a_single_joint_in_the_mesh_of_hair_is_left_out():
         meshes = [skin(who, mesh) for mesh in meshes]
         found = left_out(who, meshes, find_chains(who, meshes))
         assert [who.skeleton.names[joint].rpartition("/")[2] for joint in found] == expected
+
+
+def test_the_joint_of_a_cap_in_the_mesh_of_hair_is_not_left_out():
+    """It stays still on purpose."""
+    who = character([*tail("hair", 3), ("scalp", "head", (0, 1.6, 0))])
+    tails = skin(who, dict.fromkeys(["hair_1", "hair_2"], np.eye(3) * 0.1 + [0, 1.6, -0.1]))
+    for size, left in ((1.0, []), (0.3, ["scalp"])):
+        cap = ring(who, "scalp", size)
+        together = {
+            name: np.concatenate([getattr(mesh, name) for mesh in (tails, cap)])
+            for name in ("points", "joint_indices", "joint_weights")
+        }
+        meshes = [ring(who, "head"), replace(tails, **together)]
+        found = left_out(who, meshes, find_chains(who, meshes))
+        assert [who.skeleton.names[joint].rpartition("/")[2] for joint in found] == left
