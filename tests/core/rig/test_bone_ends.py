@@ -54,8 +54,9 @@ def test_a_strand_that_begins_at_a_joint_of_hair_is_refused_rather_than_left_sti
         find_chains(who, [skin(who, skins)])
 
 
-def test_of_two_ends_the_one_ahead_is_the_bones():
-    rows = [*tail("hair", 3), ("socket", "hair_2", (0.45, 1.54, -0.1))]
+@pytest.mark.parametrize("place", [(0.45, 1.54, -0.1), (0.3, 1.2, -0.1)], ids=["aside", "far down"])
+def test_of_two_ends_the_one_ahead_is_the_bones(place):
+    rows = [*tail("hair", 3), ("socket", "hair_2", place)]
     who = character(rows)
     skins = {name: np.eye(3) * 0.05 + [0, 1.5, -0.1] for name in ("hair_1", "hair_2")}
     np.testing.assert_allclose(
@@ -155,5 +156,6 @@ def test_the_bone_of_a_single_joint_points_where_its_skin_is_and_others_go_strai
         "hair_2": [0, 1.54, -0.11] + np.array([[0.5], [1], [2]]) * ALONG + sheet,
     }
     along = ALONG / np.linalg.norm(ALONG)
-    bones = find_chains(last, [skin(last, skins)]).bones
-    np.testing.assert_allclose(bones[1], (2 * ALONG + sheet[-1]) @ along * along, atol=1e-12)
+    for patterns in (None, ["hair_1"], ["hair_*"]):
+        bones = find_chains(last, [skin(last, skins)], patterns).bones
+        np.testing.assert_allclose(bones[1], (2 * ALONG + sheet[-1]) @ along * along, atol=1e-12)

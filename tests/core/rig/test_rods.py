@@ -9,7 +9,7 @@ from neuralocks_core.rig import find_chains
 from neuralocks_core.rig.kinematics import skin_weights
 from neuralocks_core.rig.rods import RigMaterial, RodTree
 
-from .builders import branched, character, tail
+from .builders import branched, character, skin, tail
 
 LENGTH = 0.1
 
@@ -65,3 +65,11 @@ def test_skin_of_an_end_moves_with_the_bone_and_other_skin_with_the_head():
     slots = [1 + rig.chains.names.index(name) for name in ("hair_a_2", "hair_b_1")]
     wanted[:, [0, *slots]] = [[0.7, 0.1, 0.2], [0, 1, 0]]
     np.testing.assert_allclose(found, wanted)
+    bare = tail("hair", 2)
+    who = character(bare)
+    chains = find_chains(who, [skin(who, {name: np.add(at, np.eye(3) * 0.1 - [0, 0.1, 0]) for name, _, at in bare})])
+    assert (
+        chains.joints[-1] == len(who.skeleton.names) - 1
+    )  # the last of all joints moves, and no joint is above the first
+    found = skin_weights(chains, len(who.skeleton.names), who.skeleton.parents, np.array([[0]]), np.ones((1, 1)))
+    np.testing.assert_array_equal(found, [[1, 0, 0]])
