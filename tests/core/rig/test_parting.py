@@ -10,7 +10,7 @@ import trimesh
 from neuralocks_core.mesh import rays_through
 from neuralocks_core.rig import SkinnedMesh, find_chains
 from neuralocks_core.rig.parting import parted
-from neuralocks_core.rig.rigging import HairRig
+from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.skinned_body import Body
 
 from .builders import character, tail
@@ -99,6 +99,18 @@ def test_hair_and_body_are_the_same_however_they_are_divided(name, dense):
     assert counts == {part: 0 if part in HAIR else len(parts[part][1]) for part in counts}
 
 
+@pytest.mark.parametrize("last", ["head", "curtain"])
+def test_hair_before_the_face_is_hair_in_any_order(last):
+    """The roots of a lock that hides the face ride on the head as the skin under them does."""
+    points, faces = _ball(0.115, CENTRE, lambda points: points[:, 2] > 0.02)
+    joints = np.where(points[:, 1] < CENTRE[1] - 0.09, f"{TAILS[0]}_1", "head")
+    parts = _parts(False) | {"curtain": (points, faces, joints.tolist())}
+    names = sorted(["torso", "head", "eye", "horn", "cap", "curtain", *TAILS], key=last.__eq__)
+    mesh, owner = _mesh(parts, names)
+    ((body, _),) = parted(WHO, [mesh], MOVING)
+    assert set(owner[body[:, 0]]) == {"torso", "head", "eye", "horn"}
+
+
 def test_of_a_mesh_of_hair_all_is_hair():
     """With what is worn in it, and cards on the head that nothing moves."""
     parts = _parts(False)
@@ -132,6 +144,20 @@ def test_weights_that_bleed_decide_nothing():
         bled.append(replace(mesh, joint_indices=indices, joint_weights=weights))
     for mesh, part, (body, _) in zip(bled, names, parted(WHO, bled, MOVING)):
         assert len(body) > len(mesh.triangles) - 9 if "card" not in part else not len(body)
+
+
+def test_hair_of_several_meshes_is_put_together():
+    """Its triangles keep their corners, and each corner the joint that drives it; skin between has none of it."""
+    parts = _parts(False)
+    meshes = [_mesh(parts, names)[0] for names in (TAILS[:2], ["torso", "head"], TAILS[2:])]
+    rig = assemble_rig(WHO, meshes)
+    moves = [MOVING[mesh.joint_indices[:, 0]] for mesh in meshes]
+    faces = [mesh.triangles[moved[mesh.triangles].all(axis=1)] for mesh, moved in zip(meshes, moves)]
+    wanted = np.concatenate([mesh.points[each] for mesh, each in zip(meshes, faces)])
+    np.testing.assert_allclose(rig.points[rig.triangles], WHO.canonical(wanted.reshape(-1, 3)).reshape(-1, 3, 3))
+    driven = [LEAVES[j] for mesh, moved in zip(meshes, moves) for j in mesh.joint_indices[moved, 0]]
+    assert [("head", *rig.chains.names)[column] for column in rig.weights.argmax(axis=1)] == driven
+    assert set(rig.weights.ravel()) == {0, 1}
 
 
 def test_hair_without_a_character_is_hair():
