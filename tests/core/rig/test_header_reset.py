@@ -73,6 +73,17 @@ def test_after_a_reset_nothing_of_before_is_felt(program):
             np.testing.assert_allclose(later, felt, atol=1e-4 if clock else 0)
 
 
+def test_a_push_at_an_earlier_or_at_the_same_time_is_ignored(program):
+    """As of a clip's clock where it starts again: the head is elsewhere then, and comes back."""
+    rows = moved(200)
+    felt = run_c(program, rows, COUNT)
+    for back in (0.0, 0.3, 100.0):
+        extra = rows[100:101] + np.eye(10)[1] - back * np.eye(10)[0]
+        later = run_c(program, np.concatenate([rows[:101], extra, rows[101:]]), COUNT)
+        np.testing.assert_array_equal(np.delete(later, 101, axis=0), felt)
+        np.testing.assert_array_equal(later[101], felt[100])
+
+
 def test_histories_of_two_characters_know_nothing_of_each_other(program):
     alone = [run_c(program, moved(200, seed), COUNT) for seed in (1, 2)]
     together = np.stack([moved(200, 1, 0), moved(200, 2, 1)], axis=1).reshape(400, -1)
