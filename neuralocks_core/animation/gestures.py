@@ -108,7 +108,7 @@ def _jump(puppet: Puppet, dice: Dice) -> None:
 
 
 def _walk(puppet: Puppet, dice: Dice) -> None:
-    """Walking from the first sample or from a standing start; hips bob twice a stride."""
+    """Walking from a standing start; hips bob twice a stride."""
     times, steps = puppet.times, dice.between(1.5, 2.6)
     speed = 0.75 * steps * dice.between(0.7, 1.1)
     begin = dice.start(0.2)
