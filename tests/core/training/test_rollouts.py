@@ -12,8 +12,11 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 from neuralocks_core import rotation
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.character import Character
-from neuralocks_core.measures import MEASURES, body_measures
+from neuralocks_core.materials import RANGES, at_weight_one
+from neuralocks_core.measures import HIGHEST, LOWEST, MEASURES, body_measures
+from neuralocks_core.reference.solver import SimulatedHair
 from neuralocks_core.skinned_body import Body
+from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.training.rollouts import PREROLL, SHAPES, RolloutMaker, TrainingScene, learned_measures
 from tests.core.rigs import HEAD, bind, person, straight_hair
 
@@ -55,6 +58,51 @@ def test_half_of_the_bodies_have_other_shapes_and_a_third_moves_as_given():
     assert shapes.shape == (60, 2) and 18 <= other.sum() <= 42
     for low, high in zip(shapes[other].min(axis=0), shapes[other].max(axis=0)):
         assert -SHAPES <= low < -0.6 * SHAPES and 0.6 * SHAPES < high <= SHAPES
+
+
+def test_the_solver_is_given_what_was_drawn_and_its_answer_is_kept(monkeypatch):
+    """The body in its shape, in the bind pose and in motion; each lock's own material; planes as seen from the rest vertex."""
+    scene = TrainingScene(headed(), (straight_hair(),), frames=12, strands=40)
+    maker, given = RolloutMaker(scene), {}
+    index = next(i for i in range(20) if maker.draw(i).shape.any())
+    draw, hair, way = maker.draw(index), scene.grooms[0], np.random.default_rng(0).normal(0, 0.05, (12, 40, 24, 3))
+
+    def simulate(rest, head, body, triangles, materials, **others):
+        given.update(others, rest=rest, head=head, body=body, triangles=triangles, materials=materials)
+        planes = np.tile(np.float32([0.0, 0.6, 0.8, 0.05]), (*way.shape[:-1], 1))
+        return SimulatedHair((rest + way).astype(np.float32), planes, np.arange(12.0) ** 2, np.ones(12))
+
+    monkeypatch.setattr("neuralocks_core.reference.simulate", simulate)
+    rollout = maker.make(index)
+    large, forward = draw.shape
+    own = np.linalg.inv(given["head"])
+    posed = np.einsum("tij,tvj->tvi", own[:, :3, :3], given["body"]) + own[:, None, :3, 3]
+    for ball in (given["bind_body"], *posed):  # in canonical space
+        away = np.linalg.norm(ball - [0, 0, 0.1 * forward], axis=1)
+        np.testing.assert_allclose(away, RADIUS * (1 + 0.4 * large), atol=1e-4)
+        assert given["triangles"].max() == len(ball) - 1
+    assert np.array_equal(given["rest"], maker.fitted(hair.rest[draw.strands].astype(float), draw.shape))
+    assert np.array_equal(given["neighbours"], lock_mates(given["rest"], hair.lock[draw.strands]))
+    assert (given["neighbours"] >= 0).any() and given["dt"] == scene.spec.dt and given["planes"] is True
+    for name in RANGES:
+        own = np.array([getattr(material, name) for material in draw.materials])
+        assert np.array_equal(given["materials"][name], own)
+        assert (len(np.unique(own)) == 1) == (name == "weight"), "one motion covers many materials of one weight"
+    for lock in np.unique(hair.lock[draw.strands]):
+        assert len({draw.materials[i] for i in np.flatnonzero(hair.lock[draw.strands] == lock)}) == 1
+    np.testing.assert_allclose(rollout.moved * rollout.step, way, atol=rollout.step)
+    np.testing.assert_allclose(rollout.rest, given["rest"], atol=1e-7)
+    np.testing.assert_allclose(
+        rollout.planes[..., 3], np.tile(0.05 - given["rest"] @ [0.0, 0.6, 0.8], (12, 1, 1)), atol=1e-3
+    )
+    assert np.abs(rollout.planes[..., :3] - [0.0, 0.6, 0.8]).max() < 1e-3 and rollout.residual == 30.5
+    told = at_weight_one([material.log_ratios() for material in draw.materials])[0]
+    np.testing.assert_allclose(rollout.materials, told, atol=1e-6)
+    parts = scene.spec.slices
+    for vectors in (rollout.vectors, rollout.bind):
+        lengths = np.clip(body_measures(scene.character, draw.shape), LOWEST, HIGHEST)
+        assert np.abs(vectors[..., parts["shape"]] - lengths).max() < 1e-6
+        assert np.ptp(vectors[..., parts["material"]].reshape(-1, 4), axis=0).max() == 0
 
 
 def test_a_training_has_seen_the_bodies_between_the_extremes_of_each_shape():
