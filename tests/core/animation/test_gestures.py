@@ -8,6 +8,7 @@ from neuralocks_core import rotation
 from neuralocks_core.animation.gestures import GESTURES, REST, Dice
 from neuralocks_core.animation.puppet import FRONT, SIDE, UP
 from neuralocks_core.animation.random_motion import random_clip, scripted_clip
+from neuralocks_core.errors import NeuralocksError
 from tests.core.rig.builders import character
 from tests.core.rigs import HEAD, person
 
@@ -89,6 +90,11 @@ def test_legs_and_arms_take_turns_in_a_walk_forward():
     assert np.corrcoef(np.abs(thighs[0][going]), hips[going, 1])[0, 1] < -0.9  # highest where the legs pass each other
     # A thigh turned forward has a negative angle, an arm that is in front lies at a positive place.
     assert all(np.corrcoef(thigh, arm)[0, 1] > 0.9 for thigh, arm in zip(thighs, arms))
+
+
+def test_a_motion_of_no_such_kind_is_refused():
+    with pytest.raises(NeuralocksError, match="^motion 'moonwalk': unknown kind; use shake, .*bang"):
+        scripted_clip(person(), "moonwalk")
 
 
 @pytest.mark.parametrize("kind", GESTURES)

@@ -12,7 +12,7 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 from neuralocks_core import rotation
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.character import Character
-from neuralocks_core.materials import RANGES, at_weight_one
+from neuralocks_core.materials import NO_PLANE, RANGES, UNREAD, at_weight_one
 from neuralocks_core.measures import HIGHEST, LOWEST, MEASURES, body_measures
 from neuralocks_core.reference.solver import SimulatedHair
 from neuralocks_core.skinned_body import Body
@@ -60,6 +60,16 @@ def test_half_of_the_bodies_have_other_shapes_and_a_third_moves_as_given():
         assert -SHAPES <= low < -0.6 * SHAPES and 0.6 * SHAPES < high <= SHAPES
 
 
+def test_of_a_large_lock_those_around_one_strand_are_drawn():
+    """Far from each other, they would not be tied together as they are in the whole lock."""
+    hair = straight_hair()
+    whole = replace(hair, lock=np.zeros_like(hair.lock))
+    maker = RolloutMaker(TrainingScene(person(), (whole,), strands=8))
+    for drawn in (maker.draw(index).strands for index in range(5)):
+        away = np.linalg.norm(hair.rest[:, 0] - hair.rest[drawn, None, 0], axis=-1)
+        assert sorted(drawn) in np.sort(away.argsort(axis=1)[:, :8], axis=1).tolist()
+
+
 def test_the_solver_is_given_what_was_drawn_and_its_answer_is_kept(monkeypatch):
     """The body in its shape, in the bind pose and in motion; each lock's own material; planes as seen from the rest vertex."""
     scene = TrainingScene(headed(), (straight_hair(),), frames=12, strands=40)
@@ -70,6 +80,7 @@ def test_the_solver_is_given_what_was_drawn_and_its_answer_is_kept(monkeypatch):
     def simulate(rest, head, body, triangles, materials, **others):
         given.update(others, rest=rest, head=head, body=body, triangles=triangles, materials=materials)
         planes = np.tile(np.float32([0.0, 0.6, 0.8, 0.05]), (*way.shape[:-1], 1))
+        planes[:, 0] = NO_PLANE
         return SimulatedHair((rest + way).astype(np.float32), planes, np.arange(12.0) ** 2, np.ones(12))
 
     monkeypatch.setattr("neuralocks_core.reference.simulate", simulate)
@@ -92,17 +103,18 @@ def test_the_solver_is_given_what_was_drawn_and_its_answer_is_kept(monkeypatch):
         assert len({draw.materials[i] for i in np.flatnonzero(hair.lock[draw.strands] == lock)}) == 1
     np.testing.assert_allclose(rollout.moved * rollout.step, way, atol=rollout.step)
     np.testing.assert_allclose(rollout.rest, given["rest"], atol=1e-7)
-    np.testing.assert_allclose(
-        rollout.planes[..., 3], np.tile(0.05 - given["rest"] @ [0.0, 0.6, 0.8], (12, 1, 1)), atol=1e-3
-    )
-    assert np.abs(rollout.planes[..., :3] - [0.0, 0.6, 0.8]).max() < 1e-3 and rollout.residual == 30.5
+    near, far = rollout.planes[:, 1:], rollout.planes[:, 0]
+    np.testing.assert_allclose(near[..., :3], np.broadcast_to([0.0, 0.6, 0.8], near[..., :3].shape), atol=1e-3)
+    np.testing.assert_allclose(near[..., 3], np.tile(0.05 - given["rest"][1:] @ [0.0, 0.6, 0.8], (12, 1, 1)), atol=1e-3)
+    assert (far[..., 3] < -900).all() and rollout.residual == 30.5
     told = at_weight_one([material.log_ratios() for material in draw.materials])[0]
     np.testing.assert_allclose(rollout.materials, told, atol=1e-6)
     parts = scene.spec.slices
     for vectors in (rollout.vectors, rollout.bind):
         lengths = np.clip(body_measures(scene.character, draw.shape), LOWEST, HIGHEST)
         assert np.abs(vectors[..., parts["shape"]] - lengths).max() < 1e-6
-        assert np.ptp(vectors[..., parts["material"]].reshape(-1, 4), axis=0).max() == 0
+        told = vectors[..., parts["material"]] - rollout.materials[0]
+        assert np.abs(np.delete(told, UNREAD, axis=-1)).max() < 1e-6
 
 
 def test_a_training_has_seen_the_bodies_between_the_extremes_of_each_shape():

@@ -86,6 +86,15 @@ def test_the_pool_is_the_same_for_the_same_scene(pool):
         np.testing.assert_array_equal(one.back, two.back)
 
 
+def test_the_body_of_a_moment_has_the_clips_shape_and_lies_where_its_head_sees_it(pool):
+    """A ball around the head's joint stays there, however the body moves."""
+    for moment in pool.moments:
+        (large,), points = pool._maker.draw(moment.hair).shape, moment.surface.data
+        np.testing.assert_allclose(np.linalg.norm(points, axis=1), 0.08 * (1 + 0.1 * large), atol=1e-5)
+        assert (moment.normals * points).sum(axis=1).min() > 0.95 * 0.08 * (1 + 0.1 * large)
+    assert len({len(pool.hair), *(moment.hair for moment in pool.moments)}) == 5
+
+
 def test_hair_carried_rigidly_by_an_accelerating_head_feels_that_acceleration(pool):
     """x - x^ of a point fixed to the head is the head's own second difference, which the history has as R^T (g - a)."""
     gravity, history = SPEC.slices["gravity"], SPEC.slices["history"]

@@ -84,6 +84,9 @@ def test_held_out_strands_are_never_trained_on(scene):
     groom = scene.grooms[0]
     assert not set(held_out_split(groom, True)) & set(held_out_split(groom, False))
     assert len(held_out_split(groom, True)) == kept_from_training(groom) > 0
+    half = replace(groom, valid=groom.valid & (np.arange(len(groom.rest)) % 2 == 0))
+    for out in (True, False):
+        assert np.array_equal(held_out_split(half, out), [i for i in held_out_split(groom, out) if i % 2 == 0])
     few = replace(groom, lock=groom.lock % 7)
     assert np.array_equal(held_out_split(few, True), held_out_split(few, False)) and kept_from_training(few) == 0
 
