@@ -2,6 +2,7 @@
 """Rollouts in memory, and what a step of the regression is given of them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.training import regression
 from neuralocks_core.training.farm import save
+from neuralocks_core.training.methods import samples
 from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_vectors
 from neuralocks_core.training.regression import RolloutBank
 from neuralocks_core.training.regression_options import RegressionOptions
@@ -93,3 +95,21 @@ def test_later_rollouts_replace_earlier_ones_and_a_resumed_training_has_the_same
         assert [rollout.moved.sum() for rollout in each.rollouts] == [
             maker.make(n).moved.sum() for n in (0, 1, 5, 6, 7)
         ]
+
+
+def test_inputs_are_scaled_by_all_materials_and_strands_of_the_rollouts_and_by_some_of_every_groom():
+    """Each strand has a material of its own, though the vectors hold the first one's; the rollouts stay as they are."""
+    rng, material = np.random.default_rng(0), slice(1, 3)
+    rollouts = [
+        SimpleNamespace(groom=groom, strands=rng.integers(900, size=7), vectors=rng.normal(size=(9, 5)), materials=m)
+        for groom, m in ((0, rng.normal(size=(7, 2))), (1, rng.normal(size=(7, 2))))
+    ]
+    before = [rollout.vectors.copy() for rollout in rollouts]
+    inputs = [rng.normal(size=(count, 4)) for count in (1000, 999, 30)]
+    strands, frames = samples(SimpleNamespace(inputs=inputs, rollouts=rollouts, material=material))
+    own = [inputs[rollout.groom][rollout.strands] for rollout in rollouts]
+    assert np.array_equal(strands, np.concatenate([*own, inputs[0][::2], inputs[1], inputs[2]]))
+    for rollout, vectors, part in zip(rollouts, before, (frames[:9], frames[9:]), strict=True):
+        assert np.array_equal(rollout.vectors, vectors)
+        assert np.array_equal(np.delete(part, material, axis=1), np.delete(vectors, material, axis=1))
+        assert np.array_equal(part[:, material], rollout.materials[[0, 1, 2, 3, 4, 5, 6, 0, 1]])
