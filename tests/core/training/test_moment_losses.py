@@ -43,6 +43,13 @@ class Known:
         return frame + strands
 
 
+class Parting(Known):
+    """Each strand moves farther than the one before."""
+
+    def strand_part(self, strands):
+        return torch.linspace(0, 0.05, strands.shape[1])[None, :, None].expand(len(strands), -1, 1)
+
+
 @pytest.fixture(scope="module")
 def pool():
     pool = MomentPool(TrainingScene(person(), (straight_hair(),), frames=40, strands=16), supported=False, volume=False)
@@ -132,6 +139,16 @@ def test_hair_is_tied_to_the_same_vertices_of_its_locks_other_strands(pool):
     assert len(strand) and (tied[tied >= 0] % K == vertex).all()
     lock = groom.lock[hair.strands]
     assert (lock[mate[tied >= 0]] == lock[strand]).all() and (mate[tied >= 0] != strand).all()
+
+
+def test_hair_is_tied_as_firmly_as_its_material_and_the_options_say(pool):
+    drawn = Material.random(np.random.default_rng(1))
+    plain, twice, random = (
+        losses(pool, replace(OPTIONS, static=True, **changes), seed=1, net=Parting())["adhesion"]
+        for changes in ({"adhesion": 1.0}, {"adhesion": 2.0}, {"adhesion": 1.0, "random_materials": True})
+    )
+    assert (twice, random) == pytest.approx((2 * plain, drawn.clumping / Material.clumping * plain), rel=1e-4)
+    assert plain > 1e-6
 
 
 def test_hair_that_rests_near_the_body_may_stay_there():

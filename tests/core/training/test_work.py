@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder beside a model in which its training works."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from neuralocks_core.animation.random_motion import scripted_clip
+from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.skinned_body import Body
 from neuralocks_core.training import work
+from tests.core.rigs import HEAD, person, straight_hair
+
+PARTS_OF_A_BODY = ("points", "triangles", "joint_indices", "joint_weights")
 
 
 def _kept(out):
@@ -67,6 +76,42 @@ def test_simulations_made_otherwise_are_not_gone_on_with(tmp_path, monkeypatch, 
     (tmp_path / work.INPUTS).write_text('{"seed": 0}')
     with pytest.raises(NeuralocksError, match=f"began with a different {name}; .*train without --resume"):
         work.keep_inputs(SimpleNamespace(), tmp_path, resume=True)
+
+
+def test_simulations_of_another_body_or_motion_are_not_gone_on_with(tmp_path):
+    """Each part of it that a simulation is made from counts."""
+    pytest.importorskip("warp", reason="the extra 'train' is not installed")
+    from neuralocks_core.training.rollouts import TrainingScene
+
+    points = np.random.default_rng(0).normal(size=(9, 3))
+    body = Body(points, np.array([[0, 1, 2]]), np.full((9, 1), HEAD), np.ones((9, 1)), {"large": 0.1 * points})
+    who, clip = Character(person().skeleton, body), scripted_clip(person(), "nod", 2.0)
+    clip = replace(clip, shape=np.zeros((len(clip.times), 1)))
+    scene = TrainingScene(who, (straight_hair(20),), (clip,))
+    turned = replace(who.skeleton, bind=who.skeleton.bind * np.append(np.ones((4, 3)), np.full((4, 1), 1.01), axis=1))
+    others = {
+        "character": [
+            *(Character(who.skeleton, replace(body, **{name: getattr(body, name) * 2})) for name in PARTS_OF_A_BODY),
+            Character(who.skeleton, replace(body, shapes={"large": 0.2 * points})),
+            Character(turned, body),
+            Character(who.skeleton),
+        ],
+        "clips": [
+            (),
+            (replace(clip, times=clip.times * 1.01),),
+            (replace(clip, joints=clip.joints[:, :, :, ::-1]),),
+            (replace(clip, shape=clip.shape + 0.1),),
+        ],
+        "spec": [BoundarySpec(bins=(1,) * 8)],
+        "grooms": [(straight_hair(20, seed=1),)],
+    }
+    work.keep_inputs(scene, tmp_path, resume=False)
+    facts = {"character": "character", "clips": "motion", "spec": "history", "grooms": "groom"}
+    for name, values in others.items():
+        for value in values:
+            with pytest.raises(NeuralocksError, match=f"began with a different {facts[name]};"):
+                work.keep_inputs(replace(scene, **{name: value}), tmp_path, resume=True)
+    work.keep_inputs(scene, tmp_path, resume=True)
 
 
 @pytest.mark.parametrize("learned_with", (work.CODES, work.BEGINNING))
