@@ -43,7 +43,19 @@ def hair_body(character: Character, reach: float) -> Body | None:
     new[used] = group
     faces = new[faces]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return body.part(keeper, faces[whole].astype(np.int32))
+    coarse = body.part(keeper, _without_flaps(faces[whole]))
+    return coarse.only(coarse.triangles)
+
+
+def _without_flaps(faces: np.ndarray) -> np.ndarray:
+    """Triangles (F, 3) without those that lie back to back on the same corners: between them is nothing, beside them either side is
+    outside and inside, and a corner of no others has no normal.
+    """
+    first = np.argmin(faces, axis=1)[:, None]
+    turned = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
+    way = np.where(turned[:, 1] < turned[:, 2], 1, -1)
+    _, same = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    return faces[np.bincount(same.ravel(), way)[same.ravel()] != 0]
 
 
 def _parted(group: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -6,6 +6,8 @@ import trimesh
 
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.mesh import vertex_normals
+from neuralocks_core.rotation import unit
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
 
@@ -40,6 +42,19 @@ def test_hair_beside_an_ear_is_outside():
     beside = EAR + way * [[0.03, 0.05, 0.04]]
     beside = beside[np.linalg.norm(beside - CENTRE, axis=1) > 0.105]
     assert Collider(coarse.points, coarse.triangles).distance(beside, limit=0.1)[0].min() > 0
+
+
+def test_every_vertex_has_a_normal_and_the_surface_stays_closed():
+    """Of uneven triangles, some are welded into pairs that lie back to back, with a corner that has no other."""
+    hull = trimesh.convex.convex_hull(0.09 * unit(np.random.default_rng(0).normal(size=(4000, 3)))).apply_translation(
+        CENTRE
+    )
+    coarse = hair_body(person(hull), reach=0.9)
+    normals = vertex_normals(coarse.points, coarse.triangles)
+    assert ((coarse.points - CENTRE) * normals).sum(axis=1).min() > 0.9 * 0.09
+    assert trimesh.Trimesh(coarse.points, coarse.triangles, process=False).is_watertight
+    inner = CENTRE + 0.086 * unit(np.random.default_rng(1).normal(size=(2000, 3)))
+    assert Collider(coarse.points, coarse.triangles).distance(inner, limit=0.1)[0].max() < 0
 
 
 def test_a_body_posed_for_all_frames_is_posed_as_for_each():
