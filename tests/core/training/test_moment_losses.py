@@ -152,17 +152,24 @@ def test_hair_is_tied_as_firmly_as_its_material_and_the_options_say(pool):
 
 
 def test_hair_that_rests_near_the_body_may_stay_there():
+    """On heads of any shape, each of which it is fitted to."""
     points, _ = _sphere(0.0882)
     head = bind()[HEAD, :3, 3]
     faces = ConvexHull(points).simplices
     inward = (np.cross(*np.diff(points[faces], axis=1).swapaxes(0, 1)) * points[faces[:, 0]]).sum(axis=1) < 0
     faces[inward] = faces[inward, ::-1]
-    body = Body(points + head, faces, np.full((len(points), 1), HEAD), np.ones((len(points), 1)))
+    shapes = {"large": 0.2 * points}
+    body = Body(points + head, faces, np.full((len(points), 1), HEAD), np.ones((len(points), 1)), shapes)
     scene = TrainingScene(Character(person().skeleton, body), (straight_hair(),), frames=40, strands=16)
     near = MomentPool(scene, volume=False)
-    near.grow()
-    margin = near.hair[0].margin.numpy()
-    assert margin[:, 0] == pytest.approx(0.0018, abs=5e-4) and (margin[:, -1] == np.float32(MARGIN)).all()
+    for _ in range(4):
+        near.grow()
+    larger = [near._maker.draw(index).shape[0] for index in range(4)]
+    assert 0 in larger and np.ptp(larger) > 0.1
+    for hair, large in zip(near.hair, larger, strict=True):
+        margin, root = hair.margin.numpy(), hair.rods.rest[:, 0].norm(dim=1).numpy()
+        assert root == pytest.approx(0.09 + 0.2 * large * 0.0882, abs=1e-3)
+        assert margin[:, 0] == pytest.approx(0.0018, abs=7e-4) and margin[:, -1].max() == np.float32(MARGIN)
 
 
 def _ball(radius):
