@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of mesh hair: what is hair of a skinned mesh, and that it moves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -109,3 +111,20 @@ def test_a_character_without_hair_is_no_bake(tmp_path):
     stage.GetRootLayer().Save()
     with pytest.raises(NeuralocksError, match=r"shot.usda: holds no groom and no hair chains; give a bake$"):
         preview(path, tmp_path / "hair.png")
+
+
+def test_each_picture_shows_the_pose_of_its_sample(tmp_path):
+    """Vertices follow the joint that drives them; a film begins anew where the shot is cut, but for a loop, which has no cuts."""
+    rigged = read_rigged_hair(small_shot(tmp_path / "shot.usda"))
+    source, body = rigged.source, rigged.source.character.body
+    clip = source.clip
+    scene = rigged_scene(replace(rigged, source=replace(source, clip=replace(clip, cuts=clip.times[2:3]))))
+    assert np.array_equal(scene.times, clip.times) and np.array_equal(scene.cuts, clip.times[2:3])
+    assert len(rigged_scene(replace(rigged, source=replace(source, clip=replace(clip, loop=True)))).cuts) == 0
+    joint, rest = body.joint_indices[:, 0], np.append(body.points, np.ones((len(body.points), 1)), axis=1)
+    assert (body.joint_weights[:, 0] == 1).all()
+    for frame in (0, 3, len(clip.times) - 1):
+        moved = clip.joints[frame] @ np.linalg.inv(source.character.skeleton.bind)
+        np.testing.assert_allclose(scene.body(frame), np.einsum("vij,vj->vi", moved[joint], rest)[:, :3], atol=1e-5)
+        np.testing.assert_allclose(scene.head[frame], moved[source.character.head], atol=1e-5)
+    assert np.abs(scene.body(3) - scene.body(0)).max() > 1e-3
