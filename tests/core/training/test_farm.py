@@ -81,6 +81,29 @@ def test_the_last_rollout_is_waited_for_though_its_process_has_ended():
     methods.wait(_Farm(), 1, lambda there, count: None)
 
 
+def test_who_waits_is_told_how_many_there_are_and_what_ends_the_waiting(monkeypatch):
+    """All there are, or those with the first numbers, which come in any order."""
+    monkeypatch.setattr(methods, "LOOK_AGAIN", 0.0)
+    made, said, error = [2, 0, 3, 1], [], NeuralocksError("farm: no memory")
+    looks = iter(range(5))
+
+    def files(first=None):
+        return [number for number in made[: next(looks)] if first is None or number < first]
+
+    slow = SimpleNamespace(files=files, alive=True, failed=lambda: False, failure=lambda: error)
+    methods.wait(slow, 2, lambda *numbers: said.append(numbers))
+    assert said == [(0, 2), (1, 2)]
+    said.clear()
+    looks = iter(range(5))
+    methods.wait(slow, 2, lambda *numbers: said.append(numbers), numbered=True)
+    assert said == [(0, 2), (0, 2), (1, 2), (1, 2)]
+    for alive, failed in ((True, True), (False, False)):
+        looks = iter(range(5))
+        slow.alive, slow.failed = alive, lambda failed=failed: failed
+        with pytest.raises(NeuralocksError, match="no memory"):
+            methods.wait(slow, 2, lambda *numbers: pytest.fail("it is told of a farm that has ended"))
+
+
 @pytest.mark.parametrize("kept", [0, 10, 1000])
 def test_a_damaged_file_says_what_to_do(tmp_path, kept):
     """A full disk or a power cut cuts files short; a training that is resumed reads them again."""
