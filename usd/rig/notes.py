@@ -38,7 +38,7 @@ def chain_notes(hair: RiggedHair, patterns: list[str] | None) -> list[str]:
 
 def mirrored_notes(source: StageRig, chains: HairChains) -> list[str]:
     """Which hair joint, or joint that carries one, the animation mirrors; what hangs from it is mirrored alike."""
-    joints = np.unique(np.concatenate([chains.joints, np.maximum(source.source.parents[chains.joints], 0)]))
+    joints = np.unique(np.concatenate([chains.joints, source.source.parents[chains.joints]]))
     flipped = (np.linalg.det(source.clip.joints[:, joints, :3, :3]) < 0).any(axis=0)
     if not flipped.any():
         return []

@@ -163,17 +163,19 @@ def test_a_character_in_another_format_is_told_the_way_to_usd(tmp_path, ending, 
             use(path)
 
 
-def test_hair_that_the_animation_mirrors_is_told(edited, tmp_path):
-    model = model_for(read_rigged_hair(small_shot(tmp_path / "plain.usda")))
+@pytest.mark.parametrize(("joint", "name"), [(3, "hair_1"), (2, "hair_0")])
+def test_hair_that_the_animation_mirrors_is_told(edited, tmp_path, joint, name):
+    """By a joint of its own, or by the one that carries it."""
+    model = model_for(read_rigged_hair(small_shot(tmp_path / "plain.usda"), chains=["hair_1"]))
 
     def mirror(stage):
         scales = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetScalesAttr()
         values = list(scales.Get(1.0))
-        values[3] = Gf.Vec3h(-1, 1, 1)
+        values[joint] = Gf.Vec3h(-1, 1, 1)
         scales.Set(values, 1.0)
 
     shot = edited(mirror)
-    said = "hair joint 'hair_1' is mirrored by its animation"
+    said = f"hair joint '{name}' is mirrored by its animation"
     assert any(said in note for note in bake_rig(shot, tmp_path / "out.usda", model).notes)
     assert any(said in note for note in inspect(shot)["spoils"])
 
