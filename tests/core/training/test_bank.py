@@ -12,7 +12,7 @@ from neuralocks_core.network_sizes import CODE
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
-from neuralocks_core.training import regression
+from neuralocks_core.training import methods, regression
 from neuralocks_core.training.farm import save
 from neuralocks_core.training.methods import samples
 from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_vectors
@@ -113,3 +113,16 @@ def test_inputs_are_scaled_by_all_materials_and_strands_of_the_rollouts_and_by_s
         assert np.array_equal(rollout.vectors, vectors)
         assert np.array_equal(np.delete(part, material, axis=1), np.delete(vectors, material, axis=1))
         assert np.array_equal(part[:, material], rollout.materials[[0, 1, 2, 3, 4, 5, 6, 0, 1]])
+
+
+@pytest.mark.parametrize(("count", "first"), [(1000, regression.FIRST), (3, 3)])
+def test_a_training_begins_with_the_first_simulations(monkeypatch, count, first):
+    """Not hours later, with the last."""
+    waited, bank = [], SimpleNamespace(inputs=[], read=0, add=lambda files: waited.append(files))
+    monkeypatch.setattr(methods, "RolloutBank", lambda *_: bank)
+    monkeypatch.setattr(methods, "wait", lambda farm, wanted, say, **_: say(1, wanted) or waited.append(wanted))
+    farm, said = SimpleNamespace(count=count, files=lambda first=None: ["all", first]), []
+    methods.RolloutMethod(None, None, RegressionOptions(minutes=1.0), farm, lambda *words: said.append(words))
+    assert waited == [first, ["all", None]] and said == [(1 / first, f"first simulations: 1 of {first}", first)]
+    methods.RolloutMethod(None, None, RegressionOptions(steps=9), farm, lambda *_: None)
+    assert waited[2:] == [first, first, ["all", first]], "a run of so many steps reads no more, however many are there"

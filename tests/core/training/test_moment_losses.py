@@ -93,9 +93,10 @@ def test_moments_have_as_many_strands_as_told_and_scale_the_inputs_with_the_mate
     scene = TrainingScene(person(), (straight_hair(),), frames=40)
     part = scene.spec.slices["material"]
     for random in (False, True):
-        options = replace(OPTIONS, strands=5, random_materials=random)
+        options = replace(OPTIONS, strands=5, random_materials=random, volume=float(random))
         method = MomentMethod(scene, lambda s: np.zeros((len(s.rest), CODE)), options, None, lambda *_: None)
         assert [len(hair.strands) for hair in method.pool.hair] == [5]
+        assert (method.pool.hair[0].rest_density is None) == (options.volume == 0)
         assert method.samples()[1][:, part].any() == random
         assert any(moment.vectors[:, part].any() for moment in method.pool.moments), "the pool's own stay"
 
