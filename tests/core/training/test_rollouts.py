@@ -60,6 +60,15 @@ def test_half_of_the_bodies_have_other_shapes_and_a_third_moves_as_given():
         assert -SHAPES <= low < -0.6 * SHAPES and 0.6 * SHAPES < high <= SHAPES
 
 
+def test_the_body_reaches_below_the_longest_hair_of_all_grooms(monkeypatch):
+    reaches, short = [], straight_hair()
+    long = replace(short, rest=short.rest * np.float32([1, 3, 1]))
+    monkeypatch.setattr("neuralocks_core.training.rollouts.hair_body", lambda who, reach: reaches.append(reach))
+    for grooms in ((short, long), (long, short)):
+        RolloutMaker(TrainingScene(headed(), grooms))
+    assert reaches == pytest.approx([0.2 - float(long.rest[..., 1].min())] * 2) and reaches[0] > 0.5
+
+
 def test_of_a_large_lock_those_around_one_strand_are_drawn():
     """Far from each other, they would not be tied together as they are in the whole lock."""
     hair = straight_hair()
