@@ -85,6 +85,23 @@ def head_of_a_control_rig(_folder: Path) -> None:
         assert np.allclose(points, hair, atol=2e-5), chosen
 
 
+def examined_again(_folder: Path) -> None:
+    """The panel tells of the rig as it is, also after its skin was bound and after a bone got another parent."""
+    from dcc_addon.panels import findings
+
+    rig = scenes.armature(bones=(*scenes.BONES, ("copy", "chest", (0, 0, 1.55), (0, 0, 1.75))))
+    rig.data.bones["head"].use_deform = False
+    assert findings(rig) == (["Head: head"], "")
+    scenes.body(rig)
+    assert findings(rig)[0][0].startswith("Head: copy (moves the skin")
+    choose(rig)
+    for parent, told in (("chest", True), ("neck", False)):
+        bpy.ops.object.mode_set(mode="EDIT")
+        rig.data.edit_bones["head"].parent = rig.data.edit_bones[parent]
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert any("No neck bone" in line for line in findings(rig)[0]) == told
+
+
 def _sampled(skin_bone: str, chosen: str = ""):
     """A sampled character whose head's skin moves with this bone, with a chosen head bone, and its live hair in a frame."""
     scenes.empty()
