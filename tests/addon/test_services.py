@@ -8,6 +8,7 @@ from pxr import Sdf
 
 from dcc_addon.services import axes, bones, card, names, panel_errors, rig
 from dcc_addon.services.mirror import mirrored
+from dcc_addon.services.remaining import in_words
 from neuralocks_core import model
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
@@ -217,3 +218,8 @@ def test_card_of_the_panel_has_plain_numbers_that_an_artist_can_use():
         "swing of the tips: 12 %",
         "jitter in a held pose: 100 mm",
     ]
+
+
+def test_the_time_left_is_in_seconds_up_to_a_minute():
+    said = [in_words(seconds) for seconds in (None, 0.0, 59.4, 59.6, 89.0, 3600.0)]
+    assert said == ["", ", 1 s left", ", 59 s left", ", 1 min left", ", 1 min left", ", 60 min left"]

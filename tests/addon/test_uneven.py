@@ -46,15 +46,20 @@ def test_below_a_stretched_limb_nothing_runs_away(stretch):
 
 
 def test_a_mirrored_prop_keeps_nobody_from_sampling():
-    """It stays where it was, with its first axis reversed; for a joint that moves hair, the message names the frame."""
+    """It stays where it was, with its first axis reversed; for a joint that moves hair, the message names the frame. A hidden one
+    is a ten-thousandth as large and turns as its parent does, also below another hidden one.
+    """
     world, rig = _limb(1.0), RigArrays("Rig", BONES, PARENTS, _bind())
     world[5:7, 6:, :3, :3] *= -1
     world[8, 7, :3, :3] = 0
+    world[9, 6:, :3, :3] = 0
     made = unhidden(world, rig, {0, 1}, FRAMES)
+    np.testing.assert_allclose(made[8, 7, :3, :3], 1e-4 * world[8, 6, :3, :3], atol=1e-12)
+    np.testing.assert_allclose(made[9, 6:, :3, :3], np.tile(1e-4 * world[9, 5, :3, :3], (2, 1, 1)), atol=1e-12)
     assert np.array_equal(made[5:7, 6:, :3, 0], -world[5:7, 6:, :3, 0])
     assert np.linalg.det(made[..., :3, :3]).min() > 0
     made[5:7, 6:, :3, 0] *= -1
-    made[8, 7, :3, :3] = 0
+    made[8, 7, :3, :3] = made[9, 6:, :3, :3] = 0
     assert np.array_equal(made, world)
     with pytest.raises(NeuralocksError, match="Rig: bone 'finger' has a negative scale in frame 5"):
         unhidden(world, rig, {0, 1, 6}, FRAMES)
