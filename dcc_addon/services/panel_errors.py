@@ -66,5 +66,5 @@ def with_objects(text: str, prims: dict[str, str]) -> str:
         prims: prim path by object name.
     """
     names = {prim: name for name, prim in prims.items()}
-    paths = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    paths = "|".join(map(re.escape, names))
     return re.sub(rf"({paths})(?!\w)", lambda found: names[found[0]], text) if names else text
