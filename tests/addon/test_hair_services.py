@@ -185,3 +185,4 @@ def test_hair_on_a_head_without_skin_is_not_beside_its_character():
     for aside, told in ((0.0, False), (1.0, True)):
         hair = Groom("hair", (strand + [aside, 0, 0]).astype(np.float32), np.array([24]), None)
         assert (LiveHair(hair, who, StrandModel.load()).off_skin > 0.3) == told
+    assert LiveHair(hair, replace(who, body=None), StrandModel.load()).off_skin == 0

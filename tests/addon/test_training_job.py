@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import neuralocks_core
 from dcc_addon.services import training_check, training_job
 from neuralocks_core import time_left
 from neuralocks_core.errors import NeuralocksError
@@ -186,6 +187,24 @@ def test_what_is_too_old_can_read_that_it_is():
         assert not (isinstance(node, ast.arg) and node.annotation or isinstance(node, ast.FunctionDef) and node.returns)
         assert not (isinstance(node, ast.arguments) and (node.kwonlyargs or node.posonlyargs))
         assert not (isinstance(node, ast.Raise) and node.cause)
+
+
+def test_a_child_has_the_environment_of_a_terminal(monkeypatch, tmp_path):
+    """What belongs to Blender's Python would break another; packages for Blender's Python are not for it, a checkout is."""
+    for name in ("PYTHONHOME", "PYTHONPATH", "PYTHONNOUSERSITE"):
+        monkeypatch.setenv(name, "blender")
+    monkeypatch.setenv("MINE", "kept")
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    child = training_job.environment()
+    assert {name for name in child if name.startswith("PYTHON")} == {"PYTHONPATH", "PYTHONUTF8"}
+    assert child["PYTHONPATH"] == str(training_job.ADDON.parent) and child["MINE"] == "kept"
+    assert child["OPENBLAS_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    monkeypatch.setattr(
+        neuralocks_core, "__file__", str(tmp_path / "site-packages" / "neuralocks_core" / "__init__.py")
+    )
+    child = training_job.environment()
+    assert "PYTHONPATH" not in child and child["OPENBLAS_NUM_THREADS"] == "3"
 
 
 @pytest.mark.parametrize(("python", "words"), _PROBLEMS)
