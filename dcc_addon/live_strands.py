@@ -108,7 +108,6 @@ def _sampled_with(hair, home) -> tuple:
             f"{hair.name_full}: it has no armature in this scene; choose the character above and press Attach to Character"
         )
     if hair.mode in EDITING:
-        _restore(hair)
         session.hairs.pop(hair.name_full, None)
         raise NeuralocksError(f"{hair.name_full}: the hair is being edited; Live resumes when you leave this mode")
     if problem := on_hair_bone(hair):

@@ -9,7 +9,7 @@ from unittest import SkipTest
 import bpy
 
 from tests.blender import scenes
-from tests.blender.checks import MODEL, SAME, apart, make_live, messages, needs_usd, points_at, refused
+from tests.blender.checks import MODEL, SAME, apart, choose, make_live, messages, needs_usd, points_at, refused
 
 
 def linked(folder: Path) -> None:
@@ -46,7 +46,9 @@ def linked(folder: Path) -> None:
     rig, strands = (
         next(o for o in bpy.data.objects if o.type == kind and not o.library) for kind in ("ARMATURE", "CURVES")
     )
-    scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
+    choose(None)
+    assert any(thing.library for thing in scene.objects) and bpy.ops.neuralocks.find() == {"FINISHED"}
+    assert (scene.neuralocks.armature, scene.neuralocks.hair) == (rig, strands)
     strands.neuralocks_hair.armature, strands.neuralocks_hair.model = rig, MODEL
     strands.neuralocks_hair.bend, rig.neuralocks_character.head_bone = 2.5, "head"
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "override.blend"))
