@@ -72,7 +72,9 @@ def prepared_once(_folder: Path) -> None:
 
 
 def prepared_beside(_folder: Path) -> None:
-    """In a window, a thread prepares the hair: it is at rest until then, and as usual afterwards; Live cancels; a render waits."""
+    """In a window, a thread prepares the hair: it is at rest until then, and as usual afterwards; Live cancels; a render waits;
+    nothing is left of hair that is deleted meanwhile.
+    """
     rig, strands = scenes.dancer(1500)
     make_live(rig, strands)
     shown = points_at(strands, 9)
@@ -119,6 +121,15 @@ def _in_a_window(strands, shown, groomed) -> None:
     assert session.preparing
     live.refresh(bpy.context.scene, wait=True)
     assert not session.preparing and apart(points_at(strands, 9), shown) == 0.0
+
+    own.live = False
+    own.live = True
+    assert session.preparing
+    bpy.data.objects.remove(strands)
+    finish()
+    assert not messages(), messages()
+    bpy.context.view_layer.update()
+    assert not session.hairs
 
 
 @patch.multiple("dcc_addon.operators.base", SAMPLED=0.0, _running=["as in a window"])
