@@ -8,11 +8,13 @@ from unittest.mock import patch
 import bpy
 
 from tests.blender import scenes
-from tests.blender.checks import make_live, messages
+from tests.blender.checks import make_live, messages, refused
 
 
 def pressed(folder: Path) -> None:
-    """Each takes events between two slices, and is done in the end; Esc leaves nothing half made, and the next press works."""
+    """Each takes events between two slices, and is done in the end, before which no other begins; Esc leaves nothing half made, and the
+    next press works.
+    """
     from dcc_addon.session import session
 
     rig, strands = scenes.dancer(10)
@@ -61,6 +63,7 @@ def _press(name: str, key: str = "TIMER", **settings) -> set:
     ):
         assert getattr(bpy.ops.neuralocks, name)(**settings) == {"RUNNING_MODAL"}
         (work,) = base._running
+        refused(bpy.ops.neuralocks.sample_motion, work.bl_label, "is still running")
         assert work.modal(bpy.context, SimpleNamespace(type="MOUSEMOVE")) == {"PASS_THROUGH"}
         result = work.modal(bpy.context, SimpleNamespace(type="TIMER"))
         while result == {"RUNNING_MODAL"}:
