@@ -275,12 +275,12 @@ def findings(armature) -> tuple[list[str], str]:
     """
     from .scene import armature as armature_reader
     from .scene.body import left_behind
-    from .scene.skinned import bones_with_skin
+    from .scene.skinned import skins
     from .services import rig as rig_service
 
     chosen, bones = armature.neuralocks_character.head_bone, armature.data.bones
     above = tuple(bone.parent.name if bone.parent else "" for bone in bones)
-    key = armature.name_full, tuple(bones.keys()), above, frozenset(bones_with_skin(armature)), chosen
+    key = armature.name_full, tuple(bones.keys()), above, skins(armature), chosen
     if key not in _findings:
         _findings.clear()
         try:
