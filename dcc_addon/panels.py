@@ -270,17 +270,15 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
 
 
 def findings(armature) -> tuple[list[str], str]:
-    """What is found in the rig, and what is wrong with it or with the chosen body; the rig is examined again only when bones, what
-    they are below and whether they move skin, or choices change.
+    """What is found in the rig, and what is wrong with it or with the chosen body; the rig is examined again only when it may
+    be found otherwise.
     """
     from .scene import armature as armature_reader
     from .scene.body import left_behind
-    from .scene.skinned import skins
     from .services import rig as rig_service
 
-    chosen, bones = armature.neuralocks_character.head_bone, armature.data.bones
-    above = tuple(bone.parent.name if bone.parent else "" for bone in bones)
-    key = armature.name_full, tuple(bones.keys()), above, skins(armature), chosen
+    chosen = armature.neuralocks_character.head_bone
+    key = armature.name_full, *armature_reader.found_by(armature)
     if key not in _findings:
         _findings.clear()
         try:

@@ -6,7 +6,7 @@ import numpy as np
 from ..services import names
 from ..services.rig import RigArrays
 from .paths import check_found
-from .skinned import bones_with_skin
+from .skinned import bones_with_skin, groups_of_skin
 
 
 def matrix(value) -> np.ndarray:
@@ -39,6 +39,16 @@ def read(armature, head_bone: str = "") -> RigArrays:
         head_bone,
         np.isin([bones[i].name for i in order], list(bones_with_skin(armature))),
     )
+
+
+def found_by(armature) -> tuple:
+    """What tells in a redraw whether other joints may be found in a rig: the bones, what they are below and whether they deform, the skin,
+    and the choice of the head.
+    """
+    bones = armature.data.bones
+    above = tuple(bone.parent.name if bone.parent else "" for bone in bones)
+    deform = tuple(bone.use_deform for bone in bones)
+    return tuple(bones.keys()), above, deform, groups_of_skin(armature), armature.neuralocks_character.head_bone
 
 
 class PoseReader:

@@ -5,7 +5,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..services.wind import Blowing
 from ..session import session
-from .armature import read
+from .armature import found_by, read
 from .as_baked import print_of
 from .paths import full, library_of
 from .recorded import number_of
@@ -37,13 +37,12 @@ def model(thing, setting: str) -> int | None:
 
 def _head(armature) -> list[float]:
     """Where the bone rests that carries the hair, chosen or found, for a name may be another and the bone the same; empty if there is
-    none. It is looked for when bones or the choice change: that takes longer than a redraw may.
+    none. It is looked for when another may be found: that takes longer than a redraw may.
     """
-    chosen = armature.neuralocks_character.head_bone
-    key, known = (tuple(armature.data.bones.keys()), chosen), session.heads.get(armature.name_full)
+    key, known = found_by(armature), session.heads.get(armature.name_full)
     if known is None or known[0] != key:
         try:
-            rig = read(armature, chosen)
+            rig = read(armature, armature.neuralocks_character.head_bone)
             found = rig.bones[rig.humanoid()["head"]]
         except NeuralocksError:
             found = ""

@@ -23,14 +23,13 @@ def moving_groups(mesh_object, armature) -> tuple[str, ...]:
 
 def bones_with_skin(armature) -> set[str]:
     """Names of the bones that move a group of any mesh."""
-    meshes = (o for o in bpy.data.objects if o.type == "MESH" and deformed(o, armature))
-    return {name for mesh in meshes for name in moving_groups(mesh, armature) if name}
+    return {name for mesh in _meshes(armature) for name in moving_groups(mesh, armature) if name}
 
 
-def skins(armature) -> tuple:
-    """What tells in a redraw whether `bones_with_skin` may be others: the meshes that it deforms, how many groups each has, and which
-    bones deform. The groups of a production rig take longer to look through than a redraw may.
-    """
-    meshes = (thing for thing in bpy.data.objects if thing.type == "MESH" and deformed(thing, armature))
-    groups = tuple((mesh.name_full, len(mesh.vertex_groups)) for mesh in meshes)
-    return groups, tuple(bone.use_deform for bone in armature.data.bones)
+def groups_of_skin(armature) -> tuple[tuple[str, int], ...]:
+    """Names of the meshes that an armature deforms, with their numbers of groups, which take longer to look through than a redraw may."""
+    return tuple((mesh.name_full, len(mesh.vertex_groups)) for mesh in _meshes(armature))
+
+
+def _meshes(armature):
+    return (thing for thing in bpy.data.objects if thing.type == "MESH" and deformed(thing, armature))
