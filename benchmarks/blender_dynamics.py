@@ -76,7 +76,7 @@ def particles():
 
 def xpbd():
     """Hair curves with the asset of Blender 5.2, in its mode Physics with default steps."""
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
 
     rig, ball = _head()
     rng = np.random.default_rng(0)

@@ -8,11 +8,11 @@ import time
 import bpy
 
 from .live import carriers, needs_sampling, refresh
-from .scene.layers import working_in
-from .scene.redraw import redraw
-from .scene.sampling import in_slices
-from .scene.up_to_date import notice
-from .scene.windows import drawing, layer_shown, scenes_shown
+from .scene.character.layers import working_in
+from .scene.drawing.redraw import redraw
+from .scene.drawing.windows import drawing, layer_shown, scenes_shown
+from .scene.motion.sampling import in_slices
+from .scene.motion.up_to_date import notice
 from .session import session
 
 SLICE = 0.05

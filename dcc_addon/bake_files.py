@@ -7,9 +7,9 @@ from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError
 
-from .scene import attach
-from .scene.lookup import find
-from .scene.paths import absolute, beside, usual_output
+from .scene.baked import attach
+from .scene.files.paths import absolute, beside, usual_output
+from .scene.objects.lookup import find
 from .services.overwriting import check_ours, untaken
 
 

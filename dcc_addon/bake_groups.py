@@ -8,7 +8,7 @@ from neuralocks_core.errors import NeuralocksError
 from .blowing import blowing
 from .live_strands import material_words, typed
 from .models import load_model, model_path, named_model
-from .scene import curves
+from .scene.hair import curves
 from .services.sliders import MOTION
 from .services.wind import Blowing
 

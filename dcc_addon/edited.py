@@ -12,9 +12,9 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, transformed
 
 from .kept import Followed, Written
-from .scene import curves
-from .scene.armature import matrix
-from .scene.lookup import identity
+from .scene.character.armature import matrix
+from .scene.hair import curves
+from .scene.objects.lookup import identity
 from .session import session
 
 ROUNDING = 1e-5

@@ -4,10 +4,12 @@
 from neuralocks_core.model import kind_known
 
 from .model_updates import NOTE
-from .scene import as_groomed, cached_strands, imported, recorded
-from .scene.attach import has_cache
-from .scene.muting import off_meanwhile
-from .scene.riding import on_hair_bone
+from .scene.baked import as_groomed
+from .scene.baked.attach import has_cache
+from .scene.character.riding import on_hair_bone
+from .scene.hair import cached_strands, imported
+from .scene.hair.muting import off_meanwhile
+from .scene.objects import recorded
 from .session import session
 
 

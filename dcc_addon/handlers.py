@@ -10,19 +10,21 @@ from . import background, live, model_updates
 from .live_strands import live_hairs, show_all_rest, show_rest_left
 from .models import SETTING
 from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
-from .scene import as_groomed, blur, named_from
-from .scene.appended import remake
-from .scene.attach import switch_changed
-from .scene.last_called import go_last, others_called
-from .scene.layers import working_in
-from .scene.lively import lively
-from .scene.locked import lock
-from .scene.lookup import find
-from .scene.overrides import make_comparable
-from .scene.save_as import Remade
-from .scene.together import drawn_with
-from .scene.up_to_date import ensure
-from .scene.windows import layer_shown
+from .scene.baked import as_groomed
+from .scene.baked.attach import switch_changed
+from .scene.character.layers import working_in
+from .scene.drawing.last_called import go_last, others_called
+from .scene.drawing.locked import lock
+from .scene.drawing.together import drawn_with
+from .scene.drawing.windows import layer_shown
+from .scene.files import named_from
+from .scene.files.appended import remake
+from .scene.files.overrides import make_comparable
+from .scene.files.save_as import Remade
+from .scene.hair import blur
+from .scene.motion.up_to_date import ensure
+from .scene.objects.lively import lively
+from .scene.objects.lookup import find
 from .session import session
 
 

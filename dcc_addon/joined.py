@@ -12,9 +12,9 @@ from neuralocks_core.rotation import inverse, transformed
 
 from .edited import ROUNDING
 from .kept import Stood
-from .scene import curves
-from .scene.armature import matrix
-from .scene.lookup import identity
+from .scene.character.armature import matrix
+from .scene.hair import curves
+from .scene.objects.lookup import identity
 from .session import session
 
 

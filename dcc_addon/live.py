@@ -6,12 +6,12 @@ from dataclasses import replace
 import bpy
 
 from . import live_rig, live_strands
-from .scene.guests import guests
-from .scene.layers import elsewhere, graph_of, layer_of
-from .scene.lively import lively
-from .scene.locked import lock
-from .scene.lookup import find, in_scene
-from .scene.sampled_from import key_of
+from .scene.character.layers import elsewhere, graph_of, layer_of
+from .scene.drawing.guests import guests
+from .scene.drawing.locked import lock
+from .scene.motion.sampled_from import key_of
+from .scene.objects.lively import lively
+from .scene.objects.lookup import find, in_scene
 from .session import session
 
 

@@ -8,9 +8,9 @@ from .blowing import in_core
 from .kept import Bound
 from .models import model_path, stamp
 from .pose import pose
-from .scene import rotations
-from .scene.clock import shown_frame
-from .scene.lively import lively
+from .scene.drawing.clock import shown_frame
+from .scene.keys import rotations
+from .scene.objects.lively import lively
 from .services.bones import LiveBones
 from .session import session
 from .unsampled import unsampled

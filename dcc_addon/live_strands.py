@@ -17,17 +17,17 @@ from .blowing import in_core
 from .kept import Prepared
 from .models import load_model, model_path, named_model, stamp
 from .pose import pose
-from .scene import curves
-from .scene.clock import shown_frame
-from .scene.layers import graph_of, layer_of
-from .scene.lively import lively
-from .scene.lookup import find, identity, in_scene
-from .scene.muting import mute_deformers, unmute_deformers
-from .scene.paths import check_found
-from .scene.placing import world
-from .scene.riding import on_hair_bone
-from .scene.watched import evaluated_for_itself
-from .scene.windows import drawing, layer_shown
+from .scene.character.layers import graph_of, layer_of
+from .scene.character.placing import world
+from .scene.character.riding import on_hair_bone
+from .scene.drawing.clock import shown_frame
+from .scene.drawing.watched import evaluated_for_itself
+from .scene.drawing.windows import drawing, layer_shown
+from .scene.files.paths import check_found
+from .scene.hair import curves
+from .scene.hair.muting import mute_deformers, unmute_deformers
+from .scene.objects.lively import lively
+from .scene.objects.lookup import find, identity, in_scene
 from .services import rig as rig_service
 from .services.axes import to_core
 from .services.live import LiveHair

@@ -9,7 +9,7 @@ from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.runtime import StrandModel
 
-from .scene.paths import absolute, library_of
+from .scene.files.paths import absolute, library_of
 from .session import session
 
 SETTING = {"strands": "neuralocks_hair.model", "rig": "neuralocks_character.rig_model"}

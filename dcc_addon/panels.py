@@ -10,10 +10,12 @@ from neuralocks_core.motion import LOOP_GAP
 from .hair_notes import hair_notes, unnamed_model
 from .labels import hint, message, progress, words
 from .operators.training import job, known_problem, notes
-from .scene import as_keyed, attach, hair_keys, imported
+from .scene.baked import as_keyed, attach
+from .scene.files.paths import usual_output
+from .scene.hair import imported
+from .scene.keys import hair_keys
+from .scene.motion.sampled_from import begins_later, frames_of
 from .scene.particles import waiting
-from .scene.paths import usual_output
-from .scene.sampled_from import begins_later, frames_of
 from .services.panel_errors import for_the_panel
 from .services.remaining import in_words
 from .services.sliders import SLIDERS
@@ -273,8 +275,8 @@ def findings(armature) -> tuple[list[str], str]:
     """What is found in the rig, and what is wrong with it or with the chosen body; the rig is examined again only when it may
     be found otherwise.
     """
-    from .scene import armature as armature_reader
-    from .scene.body import left_behind
+    from .scene.character import armature as armature_reader
+    from .scene.character.body import left_behind
     from .services import rig as rig_service
 
     chosen = armature.neuralocks_character.head_bone

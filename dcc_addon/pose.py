@@ -5,11 +5,11 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from .scene.binding import hidden
-from .scene.clock import shown_frame
-from .scene.hair_keys import as_before
-from .scene.last_called import others_called
-from .scene.sampled_from import timing_of
+from .scene.character.binding import hidden
+from .scene.drawing.clock import shown_frame
+from .scene.drawing.last_called import others_called
+from .scene.keys.hair_keys import as_before
+from .scene.motion.sampled_from import timing_of
 from .services.axes import to_core
 from .services.motion import as_carried, same_pose
 from .session import session

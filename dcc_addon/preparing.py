@@ -3,7 +3,7 @@
 
 import bpy
 
-from .scene.redraw import redraw
+from .scene.drawing.redraw import redraw
 from .services.threaded import Threaded
 from .session import session
 

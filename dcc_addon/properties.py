@@ -10,8 +10,8 @@ from neuralocks_core.wind import STRONGEST
 
 from . import background, live
 from .models import SETTING as MODELS
-from .scene import named_from
-from .scene.paths import FILE
+from .scene.files import named_from
+from .scene.files.paths import FILE
 from .services.sliders import SLIDERS
 from .session import session
 

@@ -8,10 +8,10 @@ import bpy
 from . import background
 from .edited import touched
 from .live_strands import EDITING, known
-from .scene import body_known
-from .scene.keyed import concerns, users_of
-from .scene.lookup import find
-from .scene.shapes import follows
+from .scene.baked import body_known
+from .scene.motion.shapes import follows
+from .scene.objects.keyed import concerns, users_of
+from .scene.objects.lookup import find
 from .session import session
 
 

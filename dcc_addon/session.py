@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from neuralocks_core.runtime import StrandModel
 
     from .kept import Bound, Followed, Prepared, Stood, Written
-    from .scene.armature import PoseReader
-    from .scene.save_as import Remade
+    from .scene.character.armature import PoseReader
+    from .scene.files.save_as import Remade
     from .services.threaded import Threaded
 
 
@@ -41,7 +41,7 @@ class SampledRig:
     trim: np.ndarray
     """See `services.motion.trim_of`."""
     key: tuple
-    """What the sampling depended on besides the animation; see `scene.sampled_from.key_of`."""
+    """What the sampling depended on besides the animation; see `scene.motion.sampled_from.key_of`."""
     bind_places: dict[str, np.ndarray]
     """World transforms (4, 4) of hair and bodies in the bind pose, by name."""
     stale: bool = False
@@ -54,13 +54,13 @@ class SampledRig:
     own: np.ndarray = None
     """Rotation and scale from the bones' own channels, without constraints, (T, J, 3, 3) float32."""
     rigging: int = 0
-    """The setup that moves the rig; see `scene.sampled_from.rigging_of`."""
+    """The setup that moves the rig; see `scene.motion.sampled_from.rigging_of`."""
     posture: int = 0
-    """The unkeyed pose; see `scene.sampled_from.posture_of`."""
+    """The unkeyed pose; see `scene.motion.sampled_from.posture_of`."""
     unreported: dict[str, int] = field(default_factory=dict)
-    """Numbers of what Blender may not report of the bodies, by name; see `scene.rigging.unreported`."""
+    """Numbers of what Blender may not report of the bodies, by name; see `scene.motion.rigging.unreported`."""
     moved_by: frozenset[str] = frozenset()
-    """Names of the objects that moved it; see `scene.sampled_from.moved_by`."""
+    """Names of the objects that moved it; see `scene.motion.sampled_from.moved_by`."""
 
     carriers: dict[str, int] = field(default_factory=dict)
     """Joints below the head that carry hair objects, by name: the jaw of a beard. All others ride on the head."""
@@ -69,11 +69,11 @@ class SampledRig:
     body_arrays: tuple[BodyArrays, ...] = ()
     """The body meshes as they were read then: a mirror object may stand elsewhere beside the body in another frame."""
     bodies_off: tuple[str, ...] = ()
-    """Notes on what hair is kept out of elsewhere than where it is drawn, or not at all; see `scene.body_drawn`, `scene.rigid_parts`."""
+    """Notes on what hair is kept out of elsewhere than where it is drawn, or not at all; see `scene.character.body_drawn`, `scene.character.rigid_parts`."""
     leaps: tuple[str, ...] = ()
     """Notes on frames at which the character jumps; see `services.leaps`."""
     hairs_off: dict[str, str] = field(default_factory=dict)
-    """Notes on hair objects, by name, that do not move with the head; see `scene.riding`."""
+    """Notes on hair objects, by name, that do not move with the head; see `scene.character.riding`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -123,9 +123,9 @@ class Session:
     grooms: dict[str, int] = field(default_factory=dict)
     """A number of the rest points of each groom that plays a cache, by the name of its Curves; dropped when these are edited."""
     heads: dict[str, tuple[tuple, str]] = field(default_factory=dict)
-    """What the head bone of armatures, by name, was found by, and its name; see `scene.as_carried`."""
+    """What the head bone of armatures, by name, was found by, and its name; see `scene.baked.as_carried`."""
     bodies: dict[tuple, tuple] = field(default_factory=dict)
-    """Numbers of the bodies of an armature in a scene; dropped when an edit may change them. See `scene.body_known`."""
+    """Numbers of the bodies of an armature in a scene; dropped when an edit may change them. See `scene.baked.body_known`."""
     surfaces: dict[str, tuple[set[str], int]] = field(default_factory=dict)
     """What animates the shape keys of each of these body meshes, and a number of it, by mesh name; dropped when it, or an action that it
     plays, is edited."""
@@ -142,7 +142,7 @@ class Session:
     paused: int = 0
     """Above zero while frames are stepped for sampling: the live view then stays out of the way."""
     watched: set[str] = field(default_factory=set)
-    """Objects that Blender evaluates although they are hidden; see `scene.watched`."""
+    """Objects that Blender evaluates although they are hidden; see `scene.drawing.watched`."""
     working: str = ""
     """Name of the operator that is at work over several slices."""
     sampling: float | None = None
@@ -151,7 +151,7 @@ class Session:
     """Armatures that could not be sampled in the background; tried again when they, a rest pose or an action change."""
 
     baked: dict[str, dict] = field(default_factory=dict)
-    """What the caches on disk were last baked of, by path, whichever file is open; see `scene.as_baked`."""
+    """What the caches on disk were last baked of, by path, whichever file is open; see `scene.baked.as_baked`."""
     files: int = 0
     """How many files were opened before the one that is open."""
     opened: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -161,13 +161,13 @@ class Session:
     edits: int = 0
     """How often animation was edited: what was sampled meanwhile is out of date."""
     switched: set[str] = field(default_factory=set)
-    """Actions that Blender will report as edited, because some of their curves were muted; see `scene.switches`."""
+    """Actions that Blender will report as edited, because some of their curves were muted; see `scene.hair.switches`."""
     wanting: bool = False
     """Whether live hair found its motion missing or out of date since this was last handled."""
     blurred: list[str] = field(default_factory=list)
-    """Hair of a render that goes on after the current save, which takes `scene.blur` off it."""
+    """Hair of a render that goes on after the current save, which takes `scene.hair.blur` off it."""
     remade: Remade | None = None
-    """Paths that were rewritten for the current save; see `scene.save_as`."""
+    """Paths that were rewritten for the current save; see `scene.files.save_as`."""
     doubtful: set[str] = field(default_factory=set)
     """Prepared hair whose groom or choices may have changed."""
 

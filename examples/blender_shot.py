@@ -109,7 +109,7 @@ def _body(armature, names, rig, up):
 
 
 def _hair(armature, item, up, strands):
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
 
     groom = item.groom
     if strands and strands < groom.strand_count:

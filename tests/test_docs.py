@@ -7,6 +7,7 @@ import ast
 import json
 import re
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -39,9 +40,9 @@ def modules() -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for folder in FOLDERS[:3]:
         for path in (ROOT / folder).rglob("*.py"):
-            own = path.parent.name if path.stem == "__init__" else path.stem
-            found.setdefault(own, set()).update(defined(path))
-            found.setdefault(path.parent.name, set()).add(own)
+            own, above = (path.parent, path.parents[1]) if path.stem == "__init__" else (path, path.parent)
+            found.setdefault(own.stem, set()).update(defined(path))
+            found.setdefault(above.name, set()).add(own.stem)
     return found
 
 
@@ -88,9 +89,9 @@ def test_what_is_named_exists(document):
             if not any(file == name or file.endswith(f"/{name}") for file in (*FILES, "README.md", "CREDITS.md"))
         ]
         for dotted in re.findall(r"(?<![\w./])[a-z_]+(?:\.[A-Za-z_]\w*)+\b(?!/)", code):
-            first, then = dotted.split(".")[:2]
-            if first in known and then not in known[first] and then not in ("py", "json", "c"):
-                missing.append(dotted)
+            for owner, name in pairwise(dotted.split(".")):
+                if owner in known and name not in known[owner] and name not in ("py", "json", "c", "usdc"):
+                    missing.append(dotted)
         for owner, field in re.findall(r"(?<![\w./])([A-Z]\w*)\.([A-Za-z_]\w*)", code):
             if owner in classes() and field not in classes()[owner]:
                 missing.append(f"{owner}.{field}")
@@ -162,40 +163,45 @@ def test_every_module_is_on_the_map(package, section):
     """Top-level modules and folders; except in the core, also the modules in folders."""
     text = (ROOT / "docs/architecture.md").read_text("utf-8").split(f"## {section}")[1].split("\n## ")[0]
     named = {word for code in re.findall(r"`([^`\n]+)`", text) for word in re.findall(r"\w+", code)}
-    folders = {path.parent for path in (ROOT / package).glob("*/__init__.py")}
+    folders = {path.parent for path in (ROOT / package).rglob("*/__init__.py")}
     there = {path.stem for path in (ROOT / package).glob("[!_]*.py")} | {folder.name for folder in folders}
     if package != "neuralocks_core":
         there |= {path.stem for folder in folders for path in folder.glob("[!_]*.py")}
     assert there <= named, there - named
 
 
-@pytest.mark.parametrize("package", ["neuralocks_core", "usd"])
-def test_nothing_imports_what_stands_further_down_the_map(package):
+@pytest.mark.parametrize(
+    ("package", "table"),
+    [("neuralocks_core", "\n`neuralocks_core/`"), ("usd", "\n`usd/`"), ("dcc_addon/scene", "\n## The Blender add-on")],
+)
+def test_nothing_imports_what_stands_further_down_the_map(package, table):
     """Rows are folders, or the top-level modules that they name."""
-    text = (ROOT / "docs/architecture.md").read_text("utf-8").split(f"\n`{package}/`")[1].split("\n\n")[1]
+    folder, dotted = ROOT / package, package.replace("/", ".")
+    text = (ROOT / "docs/architecture.md").read_text("utf-8").split(table)[1]
     order = []
-    for _, where, what, _ in (row.split("|") for row in text.splitlines()[2:]):
-        if folders := re.findall(r"`(\w+)/`", where):
-            order += [{name: sorted((ROOT / package / name).rglob("*.py"))} for name in folders]
-        else:
-            alone = {name: ROOT / package / f"{name}.py" for name in re.findall(r"`(\w+)`", what)}
-            order.append({name: [path] for name, path in alone.items() if path.exists()})
+    for _, where, what, _ in (row.split("|") for row in text[text.index("\n|") :].split("\n\n")[0].splitlines()[1:]):
+        folders = [name for name in re.findall(r"`(\w+)/`", where) if (folder / name).is_dir()]
+        alone = [name for name in re.findall(r"`(\w+)`", what) if (folder / f"{name}.py").exists()]
+        if folders:
+            order.append({name: sorted((folder / name).rglob("*.py")) for name in folders})
+        elif alone:
+            order.append({name: [folder / f"{name}.py"] for name in alone})
     named = {name for row in order for name in row}
-    assert named >= {path.parent.name for path in (ROOT / package).glob("*/__init__.py")}
+    assert named >= {path.parent.name for path in folder.glob("*/__init__.py")}
     for place, row in enumerate(order):
-        below = {f"{package}.{name}" for later in order[place + 1 :] for name in later}
+        below = {f"{dotted}.{name}" for later in order[place + 1 :] for name in later}
         for path in sum(row.values(), []):
-            assert not imported(path) & below, path
+            assert not imported(path, dotted.count(".") + 2) & below, path
 
 
-def imported(path: Path) -> set[str]:
-    """The folders, as `package.folder`, that a module imports from, wherever in it."""
+def imported(path: Path, parts: int) -> set[str]:
+    """What a module imports, wherever in it, by its first parts: `package.folder`, for two."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.ImportFrom):
             above = path.relative_to(ROOT).parts[: -node.level] if node.level else ()
-            base = [*above, *(node.module or "").split(".")]
-            found |= {".".join([*base, each.name][:2]) for each in node.names}
+            base = [*above, *(node.module.split(".") if node.module else [])]
+            found |= {".".join([*base, each.name][:parts]) for each in node.names}
     return found
 
 

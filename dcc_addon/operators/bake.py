@@ -14,13 +14,15 @@ from ..bake_files import files_of, output_path, owner_of, shot_beside
 from ..bake_groups import grouped
 from ..live import refresh
 from ..live_strands import show_rest
-from ..scene import attach, imported
-from ..scene.carried import hairs_of
+from ..scene.baked import attach
+from ..scene.character.carried import hairs_of
+from ..scene.character.riding import on_hair_bone
+from ..scene.drawing.shown import in_renders
 from ..scene.export import write_shot
-from ..scene.lookup import named
-from ..scene.muting import on_top
-from ..scene.riding import on_hair_bone
-from ..scene.shown import in_renders
+from ..scene.files.paths import check_own
+from ..scene.hair import imported
+from ..scene.hair.muting import on_top
+from ..scene.objects.lookup import named
 from ..services.names import file_label
 from ..services.overwriting import untaken
 from ..services.panel_errors import for_the_panel, with_objects
@@ -182,7 +184,7 @@ class NEURALOCKS_OT_detach(Stepwise, bpy.types.Operator):
 
     def steps(self, context):
         hair = shown_hair(context)
-        attach.check_own(hair)
+        check_own(hair)
         show_rest(hair)  # live hair also has modifiers off, and switches them off again at once
         found = attach.detach(hair)
         refresh(context.scene)

@@ -12,10 +12,10 @@ from neuralocks_core.time_left import TimeLeft
 
 from .. import background
 from ..live import refresh
-from ..scene.lookup import in_scene
-from ..scene.paths import FILE, check_found
-from ..scene.sampling import in_slices
-from ..scene.up_to_date import known
+from ..scene.files.paths import FILE, check_found
+from ..scene.motion.sampling import in_slices
+from ..scene.motion.up_to_date import known
+from ..scene.objects.lookup import in_scene
 from ..services.panel_errors import for_the_panel
 from ..services.remaining import in_words
 from ..session import session

@@ -6,12 +6,12 @@ import bpy
 from neuralocks_core.errors import NeuralocksError
 
 from ..live import refresh
-from ..scene import armature as armature_reader
-from ..scene.attach import check_own
-from ..scene.binding import carrier
-from ..scene.body import find, left_behind
-from ..scene.carried import bodies_of
-from ..scene.instances import check_real
+from ..scene.character import armature as armature_reader
+from ..scene.character.binding import carrier
+from ..scene.character.body import find, left_behind
+from ..scene.character.carried import bodies_of
+from ..scene.files.paths import check_own
+from ..scene.objects.instances import check_real
 from ..services import rig as rig_service
 from .base import Hardened, Stepwise, sampling, shown_armature
 

@@ -14,12 +14,12 @@ from ..blowing import blowing, in_core
 from ..live import refresh
 from ..live_rig import bind, rest, show_rest
 from ..models import model_path
-from ..scene import as_keyed, hair_keys
-from ..scene.attach import check_own
-from ..scene.clock import stretch_of
+from ..scene.baked import as_keyed
+from ..scene.drawing.clock import stretch_of
 from ..scene.export import write_shot
-from ..scene.lookup import named
-from ..scene.paths import absolute
+from ..scene.files.paths import absolute, check_own
+from ..scene.keys import hair_keys
+from ..scene.objects.lookup import named
 from ..services.bones import LiveBones, chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.names import file_label

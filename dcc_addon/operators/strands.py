@@ -6,9 +6,10 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..live import refresh
 from ..live_strands import show_rest
-from ..scene import imported, particles
-from ..scene.attach import check_own
-from ..scene.binding import carrier
+from ..scene import particles
+from ..scene.character.binding import carrier
+from ..scene.files.paths import check_own
+from ..scene.hair import imported
 from ..services.sliders import SLIDERS
 from ..services.threaded import loading
 from ..session import session

@@ -15,13 +15,12 @@ from neuralocks_core.training.work import abandon, reserve
 
 from ..live import refresh
 from ..models import SETTING
-from ..scene import curves
-from ..scene.attach import check_own
+from ..scene.drawing.redraw import redraw
 from ..scene.export import write_shot
-from ..scene.lookup import find, identified, identity, named
-from ..scene.paths import library_of
-from ..scene.redraw import redraw
-from ..scene.save_as import named_here, set_path
+from ..scene.files.paths import check_own, library_of
+from ..scene.files.save_as import named_here, set_path
+from ..scene.hair import curves
+from ..scene.objects.lookup import find, identified, identity, named
 from ..services.names import file_label
 from ..services.panel_errors import for_the_panel, with_objects
 from ..services.temporary import temporary_folder

@@ -9,8 +9,8 @@ from ..services import names
 from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names, skin
 from ..services.threaded import Threaded
-from . import curves
-from .paths import beside
+from .files.paths import beside
+from .hair import curves
 
 BASES = {"CATMULL_ROM": "catmullRom", "NURBS": "bspline"}
 """The USD basis of each strand type that is not straight lines."""

@@ -11,12 +11,12 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.rotation import flat
 
 from ..services.widths import radii
-from . import curves
-from .animated import moved
-from .armature import matrix
-from .attach import check_own
-from .binding import at_rest
-from .shown import homes_of
+from .character.armature import matrix
+from .character.binding import at_rest
+from .drawing.shown import homes_of
+from .files.paths import check_own
+from .hair import curves
+from .objects.animated import moved
 
 CHILD_STEPS = 4
 """A child gets at least two to this power segments."""

@@ -55,7 +55,7 @@ def armature(name: str = "Rig", bones=BONES):
 
 def hair(rig, count: int = 60, vertices: int = 24, parent: bool = True, name: str = "Hair", length: float = 0.25):
     """A Curves object of hanging strands on a head-sized ball."""
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
 
     rng = np.random.default_rng(3)
     direction = rng.normal(size=(count, 3))
@@ -220,7 +220,7 @@ def translation(offset):
 
 def surface_deform(hair):
     """The modifier that Blender puts on new hair: curves follow their deformed surface."""
-    from dcc_addon.scene.nodes import geometry_nodes
+    from dcc_addon.scene.hair.nodes import geometry_nodes
 
     tree, source, target = geometry_nodes("Surface Deform")
     deform = tree.nodes.new("GeometryNodeDeformCurvesOnSurface")

@@ -84,7 +84,7 @@ def a_part_again(folder: Path) -> None:
     """In a window, the panel tells that hair begins at rest where a part of a shot does that was opened whole, and that a bake's range
     lets it know the whole: then it is as it was.
     """
-    from dcc_addon.scene import sampled_from
+    from dcc_addon.scene.motion import sampled_from
 
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)

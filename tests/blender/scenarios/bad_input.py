@@ -169,7 +169,7 @@ def _hidden(hair, others: list, shown: np.ndarray, folder: Path) -> None:
 
 def _deleted(rig, skin, strands, other) -> None:
     """The body is deleted while it is sampled, hair while it is live; what is left is sampled, and then renamed."""
-    from dcc_addon.scene.sampling import in_slices
+    from dcc_addon.scene.motion.sampling import in_slices
     from dcc_addon.session import session
 
     steps = in_slices(bpy.context, rig, 0.0)

@@ -58,7 +58,7 @@ def many_keys(folder: Path) -> None:
     """Keys are straight between frames, and are not made one by one, which for 60 bones took seconds during which Blender stood still;
     what bones did before that did not move is one key.
     """
-    from dcc_addon.scene import hair_keys, keyframes
+    from dcc_addon.scene.keys import hair_keys, keyframes
 
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)

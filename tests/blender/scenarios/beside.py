@@ -94,7 +94,7 @@ def cancelled(folder: Path) -> None:
 def sampled_beside(_folder: Path) -> None:
     """Sampling in the background ends whatever goes wrong, says what, and tries again when the rig is fixed."""
     from dcc_addon import background
-    from dcc_addon.scene import sampling
+    from dcc_addon.scene.motion import sampling
     from dcc_addon.session import session
 
     rig, strands = scenes.dancer(20)

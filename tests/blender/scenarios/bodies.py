@@ -9,7 +9,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from dcc_addon.scene import binding
+from dcc_addon.scene.character import binding
 from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, baked_points, body_sampled, choose, make_live, points_at, refused

@@ -17,7 +17,7 @@ def drawn_by_another_scene(folder: Path) -> None:
     """Scrubbed and rendered in the scene that draws it, also in a file just opened, live hair is what its own scene shows at that
     frame, whichever is in view; also within the shutter, and with live hair bones.
     """
-    from dcc_addon.scene.layers import graph_of
+    from dcc_addon.scene.character.layers import graph_of
 
     scene, wanted = _own(folder), {}
     for frame in (5, 9):
@@ -64,7 +64,7 @@ def shown_before_its_own_scene(folder: Path) -> None:
     the background, and then is as in its own scene; also at the first frame, if the file was saved at another.
     """
     from dcc_addon import background, preparing
-    from dcc_addon.scene.layers import graph_of
+    from dcc_addon.scene.character.layers import graph_of
     from dcc_addon.session import session
 
     scene = _own(None)
@@ -87,8 +87,8 @@ def shown_before_its_own_scene(folder: Path) -> None:
 
 def not_drawn_by_another_scene(_folder: Path) -> None:
     """A scene that does not show a character leaves its hair alone, and so does one that has it in an excluded collection."""
-    from dcc_addon.scene import curves
-    from dcc_addon.scene.guests import guests
+    from dcc_addon.scene.drawing.guests import guests
+    from dcc_addon.scene.hair import curves
 
     scene = _own(None)
     strands = bpy.data.objects["Hair"]
@@ -116,7 +116,8 @@ def named_as_another(folder: Path) -> None:
     there may be ten thousand.
     """
     from dcc_addon import live
-    from dcc_addon.scene import guests, lively
+    from dcc_addon.scene.drawing import guests
+    from dcc_addon.scene.objects import lively
 
     _own(None)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "set.blend"))

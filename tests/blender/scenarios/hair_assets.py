@@ -10,7 +10,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from dcc_addon.scene.nodes import geometry_nodes, inputs_of, read_input, write_input
+from dcc_addon.scene.hair.nodes import geometry_nodes, inputs_of, read_input, write_input
 from tests.blender import scenes
 from tests.blender.checks import MODEL, apart, make_live, messages, points_at
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from dcc_addon.scene import rotations
+from dcc_addon.scene.keys import rotations
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, bones_at, choose, give_bone_model, messages, refused
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from dcc_addon.scene.up_to_date import ensure, notice
+from dcc_addon.scene.motion.up_to_date import ensure, notice
 from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, baked_points, make_live, messages, points_at

@@ -90,7 +90,7 @@ def applied_and_undone(_folder: Path) -> None:
     again if an undo goes back to the state before the add-on did that, by several steps, too.
     """
     from dcc_addon.handlers import on_update
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
     from dcc_addon.session import session
 
     if bpy.app.version < (4, 0):

@@ -6,7 +6,7 @@ from unittest import SkipTest
 
 import bpy
 
-from dcc_addon.scene import curves
+from dcc_addon.scene.hair import curves
 from tests.blender import scenes
 from tests.blender.checks import SAME, apart, baked_points, make_live, messages, needs_usd, points_at, refused, told_by
 from tests.blender.panel import drawn

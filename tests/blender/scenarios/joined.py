@@ -17,7 +17,7 @@ TURNED = scenes.translation((0.4, 0.2, 0.5)) @ Matrix.Rotation(0.7, 4, "X") @ Ma
 
 def joined_to_resting(folder: Path) -> None:
     """Live hair joined to hair that is not live comes to rest; saved or made live, all strands keep their groom."""
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
 
     if bpy.app.version < (5, 2):
         raise SkipTest("curves cannot be joined yet")
@@ -44,7 +44,7 @@ def joined_standing_differently(_folder: Path) -> None:
     """Live hairs with different transforms keep their grooms in the world when they are joined, whichever of them is live, also
     after undo and redo, and if one is a copy of the other.
     """
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
 
     if bpy.app.version < (5, 2):
         raise SkipTest("curves cannot be joined yet")
@@ -85,7 +85,7 @@ def joined_standing_differently(_folder: Path) -> None:
 
 def root_at_the_origin(_folder: Path) -> None:
     """A point exactly at the origin of its object rests there, and is not mistaken for one without a rest shape."""
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
 
     rig, strands = scenes.dancer(20)
     root = curves.shown(strands.data)[0].copy()
@@ -106,7 +106,7 @@ def root_at_the_origin(_folder: Path) -> None:
 
 def _joined(followed: bool = True):
     """Resting hair to which moved hair was joined, and the grooms of both; `followed`: the add-on has heard of it."""
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
 
     rig = scenes.armature()
     scenes.dance(rig)

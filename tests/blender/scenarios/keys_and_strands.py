@@ -24,7 +24,7 @@ def strands_beside_keyed_bones(folder: Path) -> None:
     """Strands of a character with baked hair bones are the same as without them, or with live ones, shown and baked, whether the
     track is muted or not; a solo track plays alone, also for strands.
     """
-    from dcc_addon.scene.up_to_date import notice
+    from dcc_addon.scene.motion.up_to_date import notice
     from dcc_addon.session import session
 
     needs_usd()

@@ -189,7 +189,7 @@ def beside_the_file(folder: Path) -> None:
 
 def written_by_a_script(folder: Path) -> None:
     """Hair that a script wrote into a library while Live was on is at rest if appended, and says so if linked."""
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
 
     file = str(folder / "library.blend")
     rig, strands = scenes.dancer(20)

@@ -94,7 +94,8 @@ def edited_meanwhile(folder: Path) -> None:
     motion is out of date afterwards. Frames are those of the scene that the bake began in, whichever is shown by then.
     """
     from dcc_addon.operators.bake import bake_steps
-    from dcc_addon.scene import curves, up_to_date
+    from dcc_addon.scene.hair import curves
+    from dcc_addon.scene.motion import up_to_date
     from dcc_addon.session import session
 
     rig, strands = scenes.dancer(20)
@@ -136,7 +137,7 @@ def edited_meanwhile(folder: Path) -> None:
 
 def simulated_in_slices(_folder: Path) -> None:
     """A rigid body falls through all frames, although the artist's frame is shown between them."""
-    from dcc_addon.scene.sampling import in_slices
+    from dcc_addon.scene.motion.sampling import in_slices
     from dcc_addon.session import session
 
     drawn = []
@@ -156,11 +157,11 @@ def simulated_in_slices(_folder: Path) -> None:
     assert np.ptp(drawn[0]) > 1.0 and apart(*drawn) == 0.0
 
 
-@patch("dcc_addon.scene.body.WEIGHED", 10)
+@patch("dcc_addon.scene.character.body.WEIGHED", 10)
 def weighed_in_steps(_folder: Path) -> None:
     """The weights of a large body are read in several slices, before the first frame; if edited meanwhile, they are read again."""
-    from dcc_addon.scene import body
-    from dcc_addon.scene.sampling import in_slices
+    from dcc_addon.scene.character import body
+    from dcc_addon.scene.motion.sampling import in_slices
     from dcc_addon.session import session
 
     scenes.empty()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from dcc_addon.scene.nodes import geometry_nodes
+from dcc_addon.scene.hair.nodes import geometry_nodes
 from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import make_live, messages, points_at
@@ -65,7 +65,7 @@ def deform_among_others(folder: Path) -> None:
     assert strands.data.surface_uv_map == "UVMap" and drawn() == count
     assert not [key for key in strands.data.keys() if "neuralocks" in key]
 
-    from dcc_addon.scene.muting import off_meanwhile
+    from dcc_addon.scene.hair.muting import off_meanwhile
 
     strands.data.use_fake_user, other = True, bpy.data.objects.new("Other", strands.data)
     bpy.context.scene.collection.objects.link(other)
@@ -106,8 +106,8 @@ def switched_over_time(folder: Path) -> None:
     """What shows or hides a modifier over time, keys or drivers, does not switch it on while the hair is live or plays a cache, and
     does so again afterwards; the motion is not out of date for that.
     """
-    from dcc_addon.scene.muting import off_meanwhile
-    from dcc_addon.scene.up_to_date import notice
+    from dcc_addon.scene.hair.muting import off_meanwhile
+    from dcc_addon.scene.motion.up_to_date import notice
 
     rig, strands = scenes.dancer(20)
     scene = bpy.context.scene

@@ -15,7 +15,7 @@ def held_otherwise(_folder: Path) -> None:
     the next frame.
     """
     from dcc_addon import handlers
-    from dcc_addon.scene.up_to_date import notice
+    from dcc_addon.scene.motion.up_to_date import notice
     from dcc_addon.session import session
 
     rig, scene = scenes.armature(), bpy.context.scene
@@ -89,7 +89,7 @@ def read_by_number(_folder: Path) -> None:
     """Drivers that read one number of a keyed channel, keyed lists, and shape keys that correct a pose do not make the motion out of
     date in each other frame or pose; edits of such shapes do.
     """
-    from dcc_addon.scene.up_to_date import notice
+    from dcc_addon.scene.motion.up_to_date import notice
     from dcc_addon.session import session
 
     rig, scene = scenes.armature(), bpy.context.scene

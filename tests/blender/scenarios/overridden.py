@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 import dcc_addon
-from dcc_addon.scene.attach import has_cache
+from dcc_addon.scene.baked.attach import has_cache
 from tests.blender import scenes
 from tests.blender.checks import (
     SAME,

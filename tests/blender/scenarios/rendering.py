@@ -66,7 +66,7 @@ def view_layers(folder: Path) -> None:
     """A character that one of two view layers excludes: whichever is in view, it is drawn, baked and rendered the same, also by a
     farm and through another scene; if both exclude it, a message says so.
     """
-    from dcc_addon.scene.layers import graph_of
+    from dcc_addon.scene.character.layers import graph_of
     from dcc_addon.session import session
 
     rig, scene = scenes.armature(), bpy.context.scene

@@ -8,7 +8,7 @@ from unittest.mock import patch
 import bpy
 import numpy as np
 
-from dcc_addon.scene import curves
+from dcc_addon.scene.hair import curves
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, choose, make_live, messages, points_at, refused
 

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 
 from dcc_addon.handlers import on_update
-from dcc_addon.scene import curves
-from dcc_addon.scene.nodes import geometry_nodes
+from dcc_addon.scene.hair import curves
+from dcc_addon.scene.hair.nodes import geometry_nodes
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, choose, make_live, messages, needs_usd, points_at
 

@@ -15,7 +15,7 @@ from tests.blender.checks import apart, make_live, messages, points_at
 def two_windows(_folder: Path) -> None:
     """Windows show two scenes: the characters of both are sampled in the background, one that is in both only once."""
     from dcc_addon import background
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
     from dcc_addon.session import session
 
     first, rig, strands = _dancing("Rig")
@@ -44,7 +44,7 @@ def two_windows(_folder: Path) -> None:
 def arrived_elsewhere(_folder: Path) -> None:
     """Hair is prepared while another scene comes into view: it moves when its own scene is shown again, without errors."""
     from dcc_addon import preparing
-    from dcc_addon.scene import curves
+    from dcc_addon.scene.hair import curves
     from dcc_addon.session import session
 
     scene, _, strands = _dancing("Rig")

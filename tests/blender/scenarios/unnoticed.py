@@ -120,8 +120,8 @@ def many_drivers(_folder: Path) -> None:
     """However many drivers read a rig, what animates it is listed as often as for one: in a control rig with hundreds of them, each
     look at the unkeyed values would otherwise block Blender for seconds.
     """
-    from dcc_addon.scene.animated import animated
-    from dcc_addon.scene.sampled_from import posture_of
+    from dcc_addon.scene.motion.sampled_from import posture_of
+    from dcc_addon.scene.objects.animated import animated
 
     rig, scene = scenes.armature(), bpy.context.scene
     rig["switch"] = 0.5
@@ -132,7 +132,7 @@ def many_drivers(_folder: Path) -> None:
             for curve in bone.driver_add("location"):
                 read = curve.driver.variables.new().targets[0]
                 read.id, read.data_path = rig, '["switch"]'
-        with patch("dcc_addon.scene.rigging.animated", wraps=animated) as listing:
+        with patch("dcc_addon.scene.motion.rigging.animated", wraps=animated) as listing:
             seen = posture_of(rig, scene)
         listed.append(listing.call_count)
     assert listed[0] == listed[1]

@@ -13,7 +13,7 @@ def edited_in_another_scene(_folder: Path) -> None:
     """Hair is live in one scene, and its body is keyed, sculpted or weighted in another: when the first is shown again, or rendered,
     its motion is out of date. Other meshes that are edited there change nothing.
     """
-    from dcc_addon.scene.up_to_date import known
+    from dcc_addon.scene.motion.up_to_date import known
 
     for edit in (_key_raised, _sculpt_all, _weigh_anew, None):
         scenes.empty()
@@ -36,7 +36,7 @@ def body_out_of_view(_folder: Path) -> None:
     """A body that only renders draw, beside one that is shown in its place, is edited where Blender tells nothing of it; and the
     camera icon of a modifier is not told of any body. Hiding the body, also in another view layer, changes nothing.
     """
-    from dcc_addon.scene.up_to_date import known
+    from dcc_addon.scene.motion.up_to_date import known
 
     for hide in (_disable, _exclude, None):
         for edit in (_key_raised, _sculpt_all, _weigh_anew, _mirror_off) if hide else (_mirror_off,):

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from pxr import Usd, UsdGeom
 
-from dcc_addon.scene import curves
+from dcc_addon.scene.hair import curves
 from dcc_addon.services.trainers import Trainers
 from dcc_addon.session import session
 from tests.blender import scenes

@@ -106,7 +106,7 @@ def renamed_while_sampling(_folder: Path) -> None:
 
 def renamed_while_asked_for(_folder: Path) -> None:
     """The same while an operator samples, whose work ends only with the armature's."""
-    from dcc_addon.scene.sampling import in_slices
+    from dcc_addon.scene.motion.sampling import in_slices
     from dcc_addon.session import session
     from neuralocks_core.errors import NeuralocksError
 

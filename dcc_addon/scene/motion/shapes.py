@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shape of what a rig stands on, rides on or runs along, except what animation writes: a ground, a saddle, a path."""
+
+import zlib
+
+from ...session import session
+from ..character.body import coordinates, number_of
+from ..objects.animated import animated
+from ..objects.settings import as_set, settings_of
+
+CURVE = (
+    "dimensions",
+    "resolution_u",
+    "twist_mode",
+    "twist_smooth",
+    "use_path",
+    "use_path_clamp",
+    "path_duration",
+    "eval_time",
+)
+POINT = ("co", "handle_left", "handle_right", "tilt", "radius")
+"""What an object that moves along a curve reads from its points."""
+
+
+def shape(thing) -> list:
+    """Numbers that change when the points, or the shape keys, of a curve, a mesh or a lattice are edited; none for other objects."""
+    if thing.type == "CURVE":
+        return _curve(thing.data)
+    if thing.type == "MESH":
+        return [number_of(thing.data), *_keys(thing.data.shape_keys)]
+    if thing.type == "LATTICE":
+        return [[point.co_deform[:] for point in thing.data.points], *_keys(thing.data.shape_keys)]
+    return []
+
+
+def follows(mesh, others) -> bool:
+    """Whether a body mesh only takes another shape with these data blocks, which drivers of its shape keys read; an edit of it may change
+    some of them, too.
+    """
+    data = mesh.shape_keys.animation_data if mesh.shape_keys else None
+    variables = [variable for curve in data.drivers for variable in curve.driver.variables] if data else []
+    read = {target.id for variable in variables for target in variable.targets if target.id in others}
+    if all(each in (mesh, mesh.shape_keys) or getattr(each, "data", None) == mesh for each in read):
+        return False
+    return session.vertices.get(mesh.name_full) == number_of(mesh)
+
+
+def _curve(curve) -> list:
+    moving = animated(curve.animation_data)
+    found = as_set(curve, [name for name in CURVE if name not in moving])
+    if not any(path.startswith("splines") for path in moving):
+        for spline in curve.splines:
+            found += as_set(spline, settings_of(spline))
+            for point in (*spline.points, *spline.bezier_points):
+                found.append([tuple(value) if hasattr(value, "__len__") else value for value in _of(point)])
+    return found
+
+
+def _of(point) -> list:
+    return [getattr(point, name) for name in POINT if hasattr(point, name)]
+
+
+def _keys(keys) -> list:
+    moving, found = animated(keys.animation_data) if keys else (), []
+    for block in keys.key_blocks if keys else ():
+        value = 0.0 if block.path_from_id("value") in moving else block.value
+        found += [block.name, block.mute, value, zlib.crc32(coordinates(block))]
+    return found
