@@ -17,8 +17,8 @@ from pathlib import Path
 import plain_errors  # noqa: F401
 import torch
 
-from neuralocks_core.boundary_spec import BoundarySpec
-from neuralocks_core.network_sizes import LOCK_CODES, PLAIN_STRAND, STRAND
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.models.network_sizes import LOCK_CODES, PLAIN_STRAND, STRAND
 from neuralocks_core.training.beginning import kept_coder
 from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure

@@ -85,12 +85,12 @@ def import_time() -> float:
         return time.perf_counter() - start
 
     bare = min(once("pass") for _ in range(3))
-    return min(once("import neuralocks_core.runtime, onnxruntime") for _ in range(3)) - bare
+    return min(once("import neuralocks_core.models.runtime, onnxruntime") for _ in range(3)) - bare
 
 
 def brings_torch() -> bool:
     """Whether importing the runtime and the bake imports torch."""
-    code = "import sys, usd.baking.bake, neuralocks_core.runtime, onnxruntime; print('torch' in sys.modules)"
+    code = "import sys, usd.baking.bake, neuralocks_core.models.runtime, onnxruntime; print('torch' in sys.modules)"
     return "True" in subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True).stdout
 
 
@@ -141,7 +141,7 @@ def _told(function, *arguments) -> dict:
 
 
 def _bake(shot, out, model, frames, plain) -> dict:
-    from neuralocks_core.runtime import StrandModel
+    from neuralocks_core.models.runtime import StrandModel
     from usd.baking.bake import bake
     from usd.shot.stage import read_shot
 
@@ -152,7 +152,7 @@ def _bake(shot, out, model, frames, plain) -> dict:
 
 
 def _infer(shot, out, model, frames, plain) -> dict:
-    from neuralocks_core.runtime import StrandModel
+    from neuralocks_core.models.runtime import StrandModel
     from usd.baking.posing import GroomPoser
     from usd.shot.stage import read_shot
 

@@ -15,8 +15,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from neuralocks_core import model
-from neuralocks_core.shortcomings import HELD, HELD_BEGUN
+from neuralocks_core.models import model_file
+from neuralocks_core.models.shortcomings import HELD, HELD_BEGUN
 
 DOCS = Path(__file__).resolve().parents[1] / "docs/ablations.md"
 ARTISTS = ("hair_free", "hair_front", "hair_pulled", "hair_tail", "ruby_long_hair", "ruby_short_hair", "sintel_hair")
@@ -83,11 +83,11 @@ EFFECT = (0.7, 1.3)
 def main() -> None:
     """Write the cards, and print what falls short."""
     text = DOCS.read_text(encoding="utf-8")
-    for path in (model.shipped(), *model.specialists()):
-        file = model.read(path, "strands")
+    for path in (model_file.shipped(), *model_file.specialists()):
+        file = model_file.read(path, "strands")
         kept = {name: value for name, value in file.meta["report"].items() if name in (HELD, HELD_BEGUN)}
         found = report(text, path.stem)
-        model.write(path, {**file.meta, "report": {**kept, **found}}, file.graphs)
+        model_file.write(path, {**file.meta, "report": {**kept, **found}}, file.graphs)
         print(path.stem)
         for aim, rows in found["falls short"].items():
             print(f"  {aim}: {', '.join(rows)}")

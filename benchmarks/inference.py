@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import plain_errors  # noqa: F401
 
-from neuralocks_core.network_sizes import HIDDEN, SHAPE
+from neuralocks_core.models.network_sizes import HIDDEN, SHAPE
 
 CHUNK = 512
 MATRICES = ("middle", "out")
@@ -34,7 +34,7 @@ def main() -> None:
     global clock
     clock = time.process_time if arguments.cpu_time else time.perf_counter
 
-    from neuralocks_core.runtime import StrandModel
+    from neuralocks_core.models.runtime import StrandModel
 
     model = StrandModel.load(arguments.model, threads=arguments.threads)
     print(f"{model.file.path}, {arguments.threads} threads; milliseconds a frame")

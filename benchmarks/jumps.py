@@ -22,7 +22,7 @@ from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.deformation.suited import nearest
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.runtime import StrandModel
 
 STYLES = ("long_straight", "wavy", "fringe", "bob")
 SECONDS, RATE, BREATH = 5.0, 48.0, 0.02

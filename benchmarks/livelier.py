@@ -32,8 +32,8 @@ def main() -> None:
 
 def livelier(model: Path, times: float, out: Path, damping: float = 1.0) -> Path:
     """Write the model with `times` the weight of effective gravity's changes in its history, and `damping` that of damping."""
-    from neuralocks_core import model as model_file
-    from neuralocks_core.boundary_spec import BoundarySpec
+    from neuralocks_core.boundary.spec import BoundarySpec
+    from neuralocks_core.models import model_file
     from neuralocks_core.training.beginning import Beginning
     from neuralocks_core.training.export import strand_graphs
     from neuralocks_core.training.networks import StrandNet

@@ -21,13 +21,13 @@ import numpy as np
 import plain_errors  # noqa: F401
 
 from neuralocks_core.animation.random_motion import scripted_clip
-from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary.history import BoundarySampler
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.materials import RANGES, Material
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
 from neuralocks_core.reference import simulate
-from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time

@@ -46,8 +46,8 @@ def mean(
     """Write the model whose weights are (1 - share) of `model`'s, at so many times its damping, and `share` of `begun`'s; its card
     does not tell of the hair of the grooms `without`, and tells of those of other models in `also`.
     """
-    from neuralocks_core import model as model_file
-    from neuralocks_core.boundary_spec import BoundarySpec
+    from neuralocks_core.boundary.spec import BoundarySpec
+    from neuralocks_core.models import model_file
     from neuralocks_core.training.beginning import Beginning
     from neuralocks_core.training.export import strand_graphs
     from neuralocks_core.training.networks import StrandNet

@@ -16,12 +16,13 @@ import numpy as np
 import plain_errors  # noqa: F401
 import quality
 
-from neuralocks_core import metrics, model
+from neuralocks_core import metrics
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.deformation.suited import distances
 from neuralocks_core.hairstyles import STYLES
+from neuralocks_core.models import model_file
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.reference import simulate
-from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.strand_set import strands_on
 
 KINDS, STRANDS, SEED, SECONDS = ("turn", "jump", "bow"), 28, 7000, 4.0
@@ -71,7 +72,7 @@ def rows(styles, variations):
             bench.styles = {style: groom}
             bench.chosen = {style: bench.locks(groom)}
             errors = np.mean(
-                [_errors(bench, style, kind, [load(model.shipped()), load(best)]) for kind in KINDS], axis=0
+                [_errors(bench, style, kind, [load(model_file.shipped()), load(best)]) for kind in KINDS], axis=0
             )
             yield style, variation, best, 1000 * far[best], errors
 

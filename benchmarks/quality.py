@@ -40,8 +40,8 @@ from neuralocks_core.body.collider import Collider
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.materials import Material
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.reference import simulate, stateless_floor
-from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import strands_on
 from neuralocks_core.training.hair_body import hair_body, posed_over_time

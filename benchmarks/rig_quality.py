@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import plain_errors  # noqa: F401
 
-from neuralocks_core import model as model_file
 from neuralocks_core.animation.gestures import KINDS
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models import model_file
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import RigModel, rig_spec
 from neuralocks_core.rig.rods import RigMaterial

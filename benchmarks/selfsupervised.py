@@ -19,8 +19,8 @@ import numpy as np
 import plain_errors  # noqa: F401
 import torch
 
-from neuralocks_core.boundary_spec import BoundarySpec
-from neuralocks_core.network_sizes import LOCK_CODES
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.models.network_sizes import LOCK_CODES
 from neuralocks_core.physics.bend_twist import Cosserat
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.beginning import kept_coder

@@ -14,7 +14,7 @@ import argparse
 import numpy as np
 import plain_errors  # noqa: F401
 
-from neuralocks_core import model
+from neuralocks_core.models import model_file
 
 SHOWN = {"motion": "motion error (rigid = 1)", "position": "position error [% of strand length]"}
 
@@ -33,7 +33,7 @@ def main() -> None:
     figure, axes = pyplot.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
     print("| minutes | of | motion error | position | droop |\n| ---: | ---: | ---: | ---: | ---: |")
     for path in arguments.models:
-        training = model.read(path, "strands").meta["training"]
+        training = model_file.read(path, "strands").meta["training"]
         rows = training["curve"]
         minutes = np.array([row["minutes"] for row in rows])
         for axis, (name, label) in zip(axes, SHOWN.items()):

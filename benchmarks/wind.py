@@ -21,11 +21,11 @@ from neuralocks_core import metrics
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.deformation.suited import nearest
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
 from neuralocks_core.reference import simulate
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.rods import RigMaterial
-from neuralocks_core.runtime import StrandModel
 from neuralocks_core.training.rig.motion import simulate_motions
 from neuralocks_core.training.rig.report import hair_points, no_turns
 from neuralocks_core.wind import Wind

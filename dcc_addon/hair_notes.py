@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist should know about a hair object, in the words of the panel."""
 
-from neuralocks_core.model import kind_known
+from neuralocks_core.models.model_file import kind_known
 
 from .model_updates import NOTE
 from .scene.baked import as_groomed

@@ -8,7 +8,7 @@ from functools import cache
 
 import bpy
 
-from neuralocks_core import model as model_file
+from neuralocks_core.models import model_file
 
 from .session import session
 

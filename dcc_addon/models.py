@@ -5,9 +5,9 @@ import os
 
 import bpy
 
-from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models import model_file
+from neuralocks_core.models.runtime import StrandModel
 
 from .scene.files.paths import absolute, library_of
 from .session import session

@@ -22,7 +22,7 @@ from .services.motion import Motion
 from .services.rig import BodyArrays, RigArrays
 
 if TYPE_CHECKING:
-    from neuralocks_core.runtime import StrandModel
+    from neuralocks_core.models.runtime import StrandModel
 
     from .kept import Bound, Followed, Prepared, Stood, Written
     from .scene.character.armature import PoseReader

@@ -3,8 +3,8 @@
 
 import numpy as np
 
+from neuralocks_core.arguments import number_array
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.number_arrays import number_array
 
 
 def hair_of(times=None, length=None, **hair) -> list[np.ndarray]:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from neuralocks_core.arguments import flag, number_array
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.flags import flag
-from neuralocks_core.number_arrays import number_array
 from neuralocks_core.rotation import angle_between, flat, from_vector, polar, to_vector
 
 G = 9.81

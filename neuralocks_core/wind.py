@@ -9,8 +9,8 @@ from numbers import Real
 
 import numpy as np
 
+from neuralocks_core.arguments import number_array
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.number_arrays import number_array
 
 STRONGEST = 8.0
 """Largest mean of a wind [m/s^2]: beyond this, nobody has measured how far models are off."""

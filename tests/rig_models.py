@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.rig import HairChains, RigModel
 from neuralocks_core.rig.network import feature_columns, input_limits
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from neuralocks_core import model
-from neuralocks_core.boundary_spec import BoundarySpec
-from neuralocks_core.network_sizes import PLAIN_STRAND
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.models import model_file
+from neuralocks_core.models.network_sizes import PLAIN_STRAND
 
 
 def write_random_model(
@@ -32,7 +32,7 @@ def write_random_model(
         net.out.weight.mul_(gain)
         net.out.bias.mul_(gain)
     meta = {"kind": "strands", "boundary": spec.to_json(), "anchored": anchored, "output": output}
-    return model.write(path, meta, strand_graphs(encoder, net, output))
+    return model_file.write(path, meta, strand_graphs(encoder, net, output))
 
 
 def without_rest_points(graphs: dict[str, bytes]) -> dict[str, bytes]:

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models import model_file
+from neuralocks_core.models.runtime import StrandModel
 from tests.usd.rig_shots import EXAMPLE, small_shot
 
 
@@ -44,7 +44,7 @@ def test_other_errors_keep_their_traceback(monkeypatch, capsys):
 def test_a_livelier_model_takes_acceleration_and_damping_for_so_many_times_and_nothing_else(monkeypatch, tmp_path):
     pytest.importorskip("torch", reason="the extra 'train' is not installed")
     monkeypatch.syspath_prepend(Path(__file__).parents[1] / "benchmarks")
-    shipped = model.shipped()
+    shipped = model_file.shipped()
     livelier = import_module("livelier").livelier(shipped, 1.5, tmp_path / "livelier.neuralocks", damping=1.25)
     before, after = (StrandModel.load(path) for path in (shipped, livelier))
     spec = before.spec
@@ -66,7 +66,8 @@ def test_a_livelier_model_takes_acceleration_and_damping_for_so_many_times_and_n
     more[spec.slices["history"]] = np.where(np.arange(spec.per_bin) < 3, 1.5 * history, history).ravel()
     assert_close(after.frame(pushed), before.frame(more))
     assert (
-        model.read(livelier).meta["training"]["livelier"] == "acceleration of the head, times 1.5; damping, times 1.25"
+        model_file.read(livelier).meta["training"]["livelier"]
+        == "acceleration of the head, times 1.5; damping, times 1.25"
     )
 
 

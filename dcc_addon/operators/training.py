@@ -10,7 +10,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.model import SUFFIX
+from neuralocks_core.models.model_file import SUFFIX
 from neuralocks_core.training.work import abandon, reserve
 
 from ..live import refresh

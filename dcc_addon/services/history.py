@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary.history import BoundarySampler
 from neuralocks_core.wind import Wind
 
 BLOCK = 8

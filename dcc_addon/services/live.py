@@ -4,15 +4,15 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from neuralocks_core.boundary import BoundarySampler
+from neuralocks_core.boundary.history import BoundarySampler
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.carrier import Carrier, Placing
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.root_skin import ASTRAY, RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.groom import Groom
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
-from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.strand_set import strands_on
 from neuralocks_core.wind import Wind
 

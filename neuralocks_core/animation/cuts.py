@@ -3,8 +3,8 @@
 
 import numpy as np
 
+from neuralocks_core.boundary.stepped import Stepped
 from neuralocks_core.motion import Clip
-from neuralocks_core.stepped import Stepped
 
 JUMP = 0.4
 """A step is a cut if it ends farther [m] than this from where the motion before it, and the motion after it, would have

@@ -6,11 +6,11 @@ from FBX often begin like that, and hair must not feel the way between.
 import numpy as np
 
 from neuralocks_core.animation.cuts import LONGEST
-from neuralocks_core.boundary import joints_read
+from neuralocks_core.boundary.history import joints_read
+from neuralocks_core.boundary.stepped import Stepped
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import angle_between, flat, rotation_part, volumes
-from neuralocks_core.stepped import Stepped
 
 SAME = np.radians(1.0)
 """A body whose joints are all turned by less than this [rad] from a pose shows that pose."""

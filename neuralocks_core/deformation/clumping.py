@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from neuralocks_core.materials import Material, constants
+from neuralocks_core.models.network_sizes import SHAPE, K
 from neuralocks_core.motion import GRAVITY
-from neuralocks_core.network_sizes import SHAPE, K
 from neuralocks_core.strands.locks import lock_mates, lock_means, tied_together
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet
 

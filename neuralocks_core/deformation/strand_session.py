@@ -10,8 +10,8 @@ import numpy as np
 
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.materials import RANGES, UNREAD
-from neuralocks_core.network_sizes import HIDDEN, SHAPE, K
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.network_sizes import HIDDEN, SHAPE, K
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.strands.locks import lock_codes
 from neuralocks_core.strands.strand_set import StrandSet, scalp_local
 

@@ -8,10 +8,10 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-from neuralocks_core import model
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.models import model_file
 from neuralocks_core.strands.resemblance import Learned, spread
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
 
@@ -41,7 +41,7 @@ def nearest(strands: StrandSet) -> Path:
     """The shipped model for these strands."""
     far = distances(strands)
     best = min(far, key=far.get, default=None)
-    return best if best is not None and far[best] <= NEAR else model.shipped()
+    return best if best is not None and far[best] <= NEAR else model_file.shipped()
 
 
 def distances(strands: StrandSet) -> dict[Path, float]:
@@ -52,17 +52,17 @@ def distances(strands: StrandSet) -> dict[Path, float]:
 def nearest_to_all(grooms: Iterable[StrandSet]) -> Path:
     """The shipped model that a training of these grooms begins with: the one for all hair if they are of several kinds."""
     found = {nearest(strands.subset(spread(len(strands.rest), SOME))) for strands in grooms}
-    return found.pop() if len(found) == 1 else model.shipped()
+    return found.pop() if len(found) == 1 else model_file.shipped()
 
 
 @cache
 def _specialists() -> dict[Path, Learned]:
     """The shipped models for some styles, with what they have learned."""
-    return {path: _learned(path) for path in model.specialists()}
+    return {path: _learned(path) for path in model_file.specialists()}
 
 
 def _learned(path: Path) -> Learned:
-    told = model.read(path, "strands").meta["training"].get("hair")
+    told = model_file.read(path, "strands").meta["training"].get("hair")
     try:
         return Learned(told)
     except ValueError:

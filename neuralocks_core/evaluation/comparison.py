@@ -6,7 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from neuralocks_core import metrics
-from neuralocks_core.boundary import joints_read
+from neuralocks_core.boundary.history import joints_read
+from neuralocks_core.boundary.smooth_motion import SmoothMotion
+from neuralocks_core.boundary.stepped import Stepped
+from neuralocks_core.boundary.unscaled import unscaled
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.errors import NeuralocksError
@@ -14,11 +17,8 @@ from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
 from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.skinned_body import Body
-from neuralocks_core.smooth_motion import SmoothMotion
-from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
-from neuralocks_core.unscaled import unscaled
 from neuralocks_core.wind import Wind
 
 STEP = 1 / 30

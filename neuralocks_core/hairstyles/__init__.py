@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.arguments import is_whole
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import loose, tied
@@ -17,7 +18,6 @@ from neuralocks_core.hairstyles.style import Style
 from neuralocks_core.hairstyles.variation import Variation
 from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.strands.strand_set import root_uv
-from neuralocks_core.whole_numbers import is_whole
 
 STYLES = {**loose.STYLES, **tied.STYLES}
 """The styles that `grow` knows, by name."""

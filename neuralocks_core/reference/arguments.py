@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from neuralocks_core.arguments import number_array
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES, Material
-from neuralocks_core.number_arrays import number_array
 from neuralocks_core.reference.rest import RestRods
 
 CLAMPED_WITHIN = 1e-4

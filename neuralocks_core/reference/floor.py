@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from neuralocks_core.arguments import is_whole
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.metric_arguments import shaped
 from neuralocks_core.metrics import motion_error, position_error
 from neuralocks_core.progress import Progress
 from neuralocks_core.reference.head_motion import frames_without
 from neuralocks_core.reference.solver import simulate
-from neuralocks_core.whole_numbers import is_whole
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,9 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from neuralocks_core.arguments import is_whole, number_array
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.number_arrays import number_array
 from neuralocks_core.reference.arguments import check_pose
-from neuralocks_core.whole_numbers import is_whole
 
 
 @dataclass(frozen=True, eq=False)

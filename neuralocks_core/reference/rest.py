@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neuralocks_core.arguments import flag, number_array
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.flags import flag
-from neuralocks_core.number_arrays import number_array
 from neuralocks_core.strands.bends import bends
 from neuralocks_core.strands.rest_support import rest_force
 

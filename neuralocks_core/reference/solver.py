@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from neuralocks_core.flags import flag
+from neuralocks_core.arguments import flag
 from neuralocks_core.materials import COLLISION, MARGIN
 from neuralocks_core.motion import G
 from neuralocks_core.progress import Progress

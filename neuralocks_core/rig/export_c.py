@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.rig.chains import HairChains

@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from neuralocks_core.model import REMEDIES
-from neuralocks_core.onnx_graph import OnnxGraph
+from neuralocks_core.models.model_file import REMEDIES
+from neuralocks_core.models.onnx_graph import OnnxGraph
 
 _FLOAT, _DOUBLE = 1, 11
 """Types of onnx.TensorProto."""

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from neuralocks_core import model as model_file
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.arguments import number_array
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, about
+from neuralocks_core.models import model_file
 from neuralocks_core.motion import Clip
-from neuralocks_core.number_arrays import number_array
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.kinematics import half_turns
 from neuralocks_core.wind import Wind

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neuralocks_core.groom import Groom
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.strands.arclength import resample
 from neuralocks_core.strands.centreline import centre_lines
 from neuralocks_core.strands.locks import lock_of_roots

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.network_sizes import CODE, SHAPE, K
+from neuralocks_core.models.network_sizes import CODE, SHAPE, K
 from neuralocks_core.progress import Progress
 from neuralocks_core.strands.strand_set import StrandSet, scalp_local
 from neuralocks_core.training.descent import Schedule, descend

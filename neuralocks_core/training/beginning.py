@@ -12,11 +12,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from neuralocks_core import model
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError, about, fact_of
-from neuralocks_core.network_sizes import K
-from neuralocks_core.onnx_graph import OnnxWeights
+from neuralocks_core.models import model_file
+from neuralocks_core.models.network_sizes import K
+from neuralocks_core.models.onnx_graph import OnnxWeights
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet, smoothing
@@ -34,7 +34,7 @@ class Beginning:
     """
 
     def __init__(self, path: str | Path):
-        file = model.read(path, "strands")
+        file = model_file.read(path, "strands")
         self.path, self._meta = file.path, file.meta
         self._graphs = {name: OnnxWeights(graph, f"{path}: {name}") for name, graph in file.graphs.items()}
 

@@ -12,7 +12,7 @@ import torch
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import read_npz, replace_npz
-from neuralocks_core.model import REMEDIES
+from neuralocks_core.models.model_file import REMEDIES
 
 KEPT = {
     "Adam": {"step", "exp_avg", "exp_avg_sq"},

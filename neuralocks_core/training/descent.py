@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.model import REMEDIES
+from neuralocks_core.models.model_file import REMEDIES
 
 Losses = Callable[[float], dict[str, torch.Tensor]]
 """Used share of the budget (0..1) -> named, weighted losses of one batch; their sum is minimised."""

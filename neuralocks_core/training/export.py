@@ -7,16 +7,16 @@ import numpy as np
 import torch
 from torch import nn
 
-from neuralocks_core.model import REMEDIES
-from neuralocks_core.network_sizes import SHAPE, K
-from neuralocks_core.onnx_graph import OnnxGraph
+from neuralocks_core.models.model_file import REMEDIES
+from neuralocks_core.models.network_sizes import SHAPE, K
+from neuralocks_core.models.onnx_graph import OnnxGraph
 from neuralocks_core.strands.strand_set import CLAMPED
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet, smoothing
 
 
 def strand_graphs(autoencoder: StrandAutoencoder, net: StrandNet, output: str) -> dict[str, bytes]:
-    """The graphs that `model.write` stores, by file name.
+    """The graphs that `model_file.write` stores, by file name.
 
     Normalisation is folded into the weights, so all inputs are SI. Parts that are computed once per frame or groom are stored in
     float16 if they include a deep map, which keeps the file small (0.006 mm error on average on the shipped shot); all

@@ -17,7 +17,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import read_npz, replace_npz
 from neuralocks_core.materials import RANGES
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.training.rollouts import FINEST, Rollout, RolloutMaker, TrainingScene
 
 

@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.strands.strand_set import StrandSet, root_frames, root_uv
 
 POLAR = np.array([-1.0, 1.0, 1.0], np.float32)

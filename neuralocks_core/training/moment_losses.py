@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.materials import Material
 from neuralocks_core.physics.energies import Stiffness, Surroundings, energies
 from neuralocks_core.physics.inertia import inertia

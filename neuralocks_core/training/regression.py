@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from neuralocks_core.deformation.strand_session import strand_inputs
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.farm import load

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from neuralocks_core.materials import MARGIN
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.training.networks import StrandNet, deform
 from neuralocks_core.training.regression_options import RegressionOptions
 

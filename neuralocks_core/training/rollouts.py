@@ -13,19 +13,19 @@ import numpy as np
 
 from neuralocks_core.animation.random_motion import check_weights, random_clip
 from neuralocks_core.body.tree_search import surface_tree
-from neuralocks_core.boundary import BoundarySampler, joints_read
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler, joints_read
+from neuralocks_core.boundary.smooth_motion import SmoothMotion
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.boundary.stepped import Stepped
+from neuralocks_core.boundary.unscaled import unscaled
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES, Material, at_weight_one
 from neuralocks_core.measures import body_measures
 from neuralocks_core.motion import Clip
-from neuralocks_core.smooth_motion import SmoothMotion
-from neuralocks_core.stepped import Stepped
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.hair_body import hair_body, posed_over_time
-from neuralocks_core.unscaled import unscaled
 
 FINEST = 2.0**-15
 """[m] Displacements are multiples of this step, 0.03 mm, in two bytes; longer hair, which would not fit, has a larger step."""

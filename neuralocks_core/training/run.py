@@ -13,7 +13,7 @@ from pathlib import Path
 
 import torch
 
-from neuralocks_core.shortcomings import HELD, HELD_BEGUN
+from neuralocks_core.models.shortcomings import HELD, HELD_BEGUN
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.beginning import Beginning
 from neuralocks_core.training.farm import RolloutFarm

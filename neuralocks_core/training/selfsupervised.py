@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.moment_losses import moment_losses
 from neuralocks_core.training.moment_options import SelfSupervisedOptions

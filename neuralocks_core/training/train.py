@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models import model_file
+from neuralocks_core.models.shortcomings import KEPT
 from neuralocks_core.progress import Progress
-from neuralocks_core.shortcomings import KEPT
 from neuralocks_core.strands.resemblance import learned_hair
 from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training import checkpoint
@@ -109,7 +109,7 @@ def train_strands(
         description, graphs = _trained(scene, work, options, rollouts, processes, beginning, resume, tell, report)
         description["training"] = {"command": command, **description["training"]}
         description["credits"] = list(dict.fromkeys([*description["credits"], *credits]))
-        path = model.write(out, description, graphs)
+        path = model_file.write(out, description, graphs)
         if not keep_work:
             discard(work)
     return path

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write, cannot_write
 from neuralocks_core.lock_file import FolderLock
+from neuralocks_core.models import model_file
 
 if TYPE_CHECKING:  # cleaning up after a training needs no solver
     from neuralocks_core.training.rollouts import TrainingScene
@@ -38,7 +38,7 @@ def work_folder(out: str | Path, resume: bool) -> Path:
     Raises:
         NeuralocksError: `out` is not a name for a model, or there is nothing to resume.
     """
-    work = folder_beside(model.named(out))
+    work = folder_beside(model_file.named(out))
     if resume and not any((work / name).exists() for name in ("checkpoint.npz", CODES, BEGINNING, INPUTS)):
         raise NeuralocksError(f"{work}: holds no training to resume; train without --resume")
     return work

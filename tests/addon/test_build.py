@@ -5,7 +5,7 @@ import json
 import zipfile
 
 from dcc_addon import build
-from neuralocks_core import model
+from neuralocks_core.models import model_file
 from neuralocks_core.native.build import TARGETS
 from neuralocks_core.native.library import file_for
 
@@ -14,7 +14,7 @@ def test_the_wheel_holds_the_packages_the_models_and_the_licences(tmp_path):
     """Built as `make addon` builds it, with what the tests' environment holds."""
     with zipfile.ZipFile(build.own_wheel(tmp_path / "own")) as made:
         listed = set(made.namelist())
-    models = {path.name for path in (model.shipped(), *model.specialists(), model.shipped("rig"))}
+    models = {path.name for path in (model_file.shipped(), *model_file.specialists(), model_file.shipped("rig"))}
     shipped = models | {"shot/shot.usda"}
     assert {f"neuralocks_core/shipped/{name}" for name in shipped} <= listed
     assert {"usd/cli/app.py", "neuralocks_core/rig/hair.h.in"} <= listed

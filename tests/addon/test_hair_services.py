@@ -14,9 +14,9 @@ from dcc_addon.services.live import LiveHair
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
-from neuralocks_core.runtime import StrandModel
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.wind import Wind
 from tests.core.rig.builders import character

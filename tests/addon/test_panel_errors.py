@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dcc_addon.services.panel_errors import WORDS, for_the_panel, with_objects
-from neuralocks_core.model import REMEDIES
+from neuralocks_core.models.model_file import REMEDIES
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -11,8 +11,8 @@ from dcc_addon.services.history import SampledBoundary
 from dcc_addon.services.leaps import leaps_told
 from dcc_addon.services.motion import Motion, frame_numbers, similar
 from neuralocks_core.animation.cuts import find_cuts
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip, loop_turns
 from neuralocks_core.rotation import from_vector

@@ -9,10 +9,10 @@ from pxr import Sdf
 from dcc_addon.services import axes, bones, card, names, panel_errors, rig
 from dcc_addon.services.mirror import mirrored
 from dcc_addon.services.remaining import in_words
-from neuralocks_core import model
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
+from neuralocks_core.models import model_file
 from neuralocks_core.rig import rig_spec
 from neuralocks_core.rotation import transformed
 from tests.addon.few_bones import BONES, PARENTS, rest
@@ -153,7 +153,7 @@ def test_errors_name_what_the_panel_has(tmp_path):
         assert "--" in str(error.value) and "skeleton:" not in str(error.value)
         assert "--" not in (said := panel_errors.for_the_panel(str(error.value))) and "neuralocks " not in said, said
     with pytest.raises(NeuralocksError) as error:
-        model.read(tmp_path / "nowhere.neuralocks", "strands")
+        model_file.read(tmp_path / "nowhere.neuralocks", "strands")
     assert "--" not in panel_errors.for_the_panel(str(error.value))
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.measures import AVERAGE, HIGHEST, LOWEST, body_measures
 from neuralocks_core.skinned_body import Body

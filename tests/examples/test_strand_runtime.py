@@ -8,8 +8,8 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from examples.strand_runtime import differences
-from neuralocks_core import model as model_file
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.models import model_file
 from tests.strand_models import write_random_model
 from tests.usd.shots import HEAD, JOINTS, Recipe, strand_points, write_shot
 from usd.baking.bake import bake

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core.arguments import flag
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.body.head_field import head_field
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
-from neuralocks_core.flags import flag
 from neuralocks_core.groom import LARGEST_COORDINATE, Groom
 from neuralocks_core.hairstyles import Obstacle, Scalp, check_style, from_head
 from neuralocks_core.hairstyles import grow as grow_style

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, UsdGeom, Vt
 
+from neuralocks_core.arguments import flag
 from neuralocks_core.deformation.freeing import freed
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.files import as_path, check_writable
-from neuralocks_core.flags import flag
 from neuralocks_core.formats.look import Look
 from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles.fitting import sized

@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict
 
-from neuralocks_core import model as model_file
+from neuralocks_core.arguments import flag
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
-from neuralocks_core.flags import flag
 from neuralocks_core.materials import Material
+from neuralocks_core.models import model_file
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.progress import Progress
-from neuralocks_core.runtime import StrandModel
 from neuralocks_core.wind import check_felt
 
 from ..border.amounts import check_number

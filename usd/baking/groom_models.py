@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from neuralocks_core.deformation.suited import suited
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.runtime import StrandModel
 
 from ..shot.stage import StageGroom
 

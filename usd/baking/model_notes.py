@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from neuralocks_core.materials import Material
-from neuralocks_core.model import shipped, specialists
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.model_file import shipped, specialists
+from neuralocks_core.models.runtime import StrandModel
 
 from ..shot.attach import Attachment, off_head
 from ..shot.character_notes import untrained

@@ -10,7 +10,7 @@ from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.errors import about
 from neuralocks_core.materials import Material
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.wind import Wind
 

@@ -9,13 +9,13 @@ from dataclasses import asdict, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from neuralocks_core.arguments import flag
 from neuralocks_core.deformation.lengths import keep_lengths
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.errors import NeuralocksError, about
 from neuralocks_core.evaluation.comparison import BLOWN, RUN_IN, simulated
 from neuralocks_core.files import as_path
-from neuralocks_core.flags import flag
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress
 from neuralocks_core.warp_device import start_warp

@@ -12,7 +12,7 @@ from pxr import Ar, Sdf, Tf, Usd
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.formats import EXTENSIONS
-from neuralocks_core.model import SUFFIX as MODEL
+from neuralocks_core.models.model_file import SUFFIX as MODEL
 
 from .damage import first_line, named
 from .stopping import check

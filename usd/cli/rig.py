@@ -82,7 +82,7 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a tiny network for the hair joints of one rig (extra 'train'). No data is needed."""
-    from neuralocks_core import model as model_file
+    from neuralocks_core.models import model_file
     from neuralocks_core.rig.report_text import report_lines
 
     from ..rig.train import train_rig

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.shortcomings import HELD, HELD_BEGUN, KEPT
+from neuralocks_core.models.shortcomings import HELD, HELD_BEGUN, KEPT
 
 from .command import note, noting_when_cut_short, print_json, say
 from .options import AsJson, Head, Joints, Out, Seed, Skeleton, numbers, pairs
@@ -90,7 +90,7 @@ def train_command(
     as_json: AsJson = False,
 ) -> None:
     """Train a strand model for a character (extra 'train')."""
-    from neuralocks_core import model
+    from neuralocks_core.models import model_file
 
     from ..models.train import train
     from .progress import progress_bar
@@ -102,7 +102,7 @@ def train_command(
             skeleton=skeleton, head=head, joints=pairs(joint, "--joint"), begin=begin, resume=resume, variations=variations, gestures=numbers(gesture, "--gesture"),
             rollouts=rollouts, processes=processes, credits=credit or [], keep_work=keep_work, tell=note, progress=progress,
         )  # fmt: skip
-    meta = model.read(path).meta
+    meta = model_file.read(path).meta
     if as_json:
         print_json({"path": str(path), "training": meta["training"], "report": meta["report"]})
         return

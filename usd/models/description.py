@@ -3,17 +3,17 @@
 
 import numpy as np
 
-from neuralocks_core import model as model_file
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.boundary.stepped import LONGEST
 from neuralocks_core.deformation.clumping import CANTILEVER
 from neuralocks_core.errors import about
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.measures import MEASURES
+from neuralocks_core.models import model_file
+from neuralocks_core.models.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND, K
+from neuralocks_core.models.runtime import graph_session
 from neuralocks_core.motion import G
-from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND, K
-from neuralocks_core.runtime import graph_session
-from neuralocks_core.stepped import LONGEST
 from neuralocks_core.wind import ACROSS, FREQUENCIES, PHASES, SHARES
 
 from ..border.units import FASTEST, SLOWEST

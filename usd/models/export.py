@@ -10,16 +10,16 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, atomic_write
 from neuralocks_core.json_values import plain, readable
+from neuralocks_core.models import model_file
 
 from ..border.stopping import check
 from .description import described
 
 if TYPE_CHECKING:
-    from neuralocks_core.runtime import StrandModel
+    from neuralocks_core.models.runtime import StrandModel
 
     from ..shot.stage import StageGroom
 

@@ -14,9 +14,9 @@ import numpy as np
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.deformation.root_skin import RootSkin
 from neuralocks_core.deformation.strand_session import StrandSession, rest_edges
-from neuralocks_core.network_sizes import HIDDEN, SHAPE, K
+from neuralocks_core.models.network_sizes import HIDDEN, SHAPE, K
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.rotation import rotation_part, sizes
-from neuralocks_core.runtime import StrandModel
 
 from ..baking.placing import GroomPlacer
 from ..shot.stage import StageGroom

@@ -7,12 +7,12 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from neuralocks_core import model
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.arguments import flag
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.deformation.suited import nearest_to_all
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
-from neuralocks_core.flags import flag
+from neuralocks_core.models import model_file
 from neuralocks_core.number_words import plain_number
 from neuralocks_core.progress import Progress
 
@@ -111,14 +111,14 @@ def train(
         variations=variations, tell=tell, progress=progress, gestures=gestures, **history,
     )  # fmt: skip
     suited = nearest_to_all(scene.grooms) if checked and begin in (None, SHIPPED) else None
-    if suited and tell and (hair := model.kind_known(suited)):
+    if suited and tell and (hair := model_file.kind_known(suited)):
         tell([f"training begins with the shipped model for {hair} hair, which knows such hair best"])
     path = train_strands(
         scene, out, options, rollouts=rollouts, processes=processes, begin=suited or checked, resume=resume,
         credits=tuple(credits), command=command_line(), keep_work=keep_work, tell=tell, progress=progress,
     )  # fmt: skip
     if tell:
-        tell(model.read(path).shortcomings())
+        tell(model_file.read(path).shortcomings())
     return path
 
 
@@ -135,7 +135,7 @@ def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, opti
         return None
     if begin not in (None, SHIPPED) and not Path(begin).exists():
         raise NeuralocksError(f"{begin}: no such model file; name another, '{SHIPPED}' or '{NOTHING}'")
-    beginning = Beginning(model.shipped() if begin in (None, SHIPPED) else begin)
+    beginning = Beginning(model_file.shipped() if begin in (None, SHIPPED) else begin)
     if begin is None and beginning.differences(spec, options):
         return None
     beginning.check(spec, options, resume)

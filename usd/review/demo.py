@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
+from neuralocks_core.arguments import flag
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
 from neuralocks_core.files import as_path, atomic_write
-from neuralocks_core.flags import flag
 from neuralocks_core.preview.pictures import LacksLibrary
 from neuralocks_core.progress import Progress
 

@@ -12,8 +12,8 @@ from neuralocks_core.body.enclosed import without_air
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.resolve import Resolver, reach
 from neuralocks_core.errors import about
+from neuralocks_core.models.runtime import cores
 from neuralocks_core.progress import Progress
-from neuralocks_core.runtime import cores
 from neuralocks_core.strands.strand_set import StrandSet
 
 from .subject import Subject

@@ -4,9 +4,9 @@
 import numpy as np
 
 from neuralocks_core import metrics
+from neuralocks_core.arguments import flag
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card
-from neuralocks_core.flags import flag
 from neuralocks_core.materials import Material
 from neuralocks_core.progress import Progress, silent
 

@@ -11,7 +11,7 @@ from neuralocks_core.deformation.suited import suited
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.materials import Material
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.strands.arclength import arc_lengths, count_pointlike
 
 from ..baking.bake import RECORDED, digest_of

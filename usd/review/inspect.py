@@ -4,11 +4,11 @@
 from pathlib import Path
 
 from neuralocks_core.anatomy.humanoid import NoHead
-from neuralocks_core.boundary_spec import POSE_JOINTS
+from neuralocks_core.boundary.spec import POSE_JOINTS
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
-from neuralocks_core.model import SUFFIX
+from neuralocks_core.models.model_file import SUFFIX
 from neuralocks_core.rig.finding import NoHairChains
 from neuralocks_core.rig.rigging import assemble_rig
 
@@ -178,13 +178,13 @@ def _height(rig: StageRig) -> float | None:
 
 
 def _model(path: Path) -> dict:
-    from neuralocks_core import model
+    from neuralocks_core.models import model_file
 
-    file = model.read(path)
+    file = model_file.read(path)
     keep = ("format", "kind", "output", "anchored", "static", "training", "report", "credits")
     facts = {"model": {key: file.meta.get(key) for key in keep if key in file.meta}}
     if file.kind == "strands":
-        from neuralocks_core.runtime import StrandModel
+        from neuralocks_core.models.runtime import StrandModel
 
         facts["inputs of the body"] = StrandModel(file, threads=1).spec.size
     return facts | {"stops": [], "spoils": file.shortcomings()}

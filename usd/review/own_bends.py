@@ -10,7 +10,7 @@ import numpy as np
 from neuralocks_core.evaluation.pose_energies import energies
 from neuralocks_core.groom import Groom
 from neuralocks_core.materials import Material
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 
 DOUBLED = 0.01
 """A vertex within this share of a mean edge of the previous one is the same: its direction would be a rounding error."""

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core.arguments import flag
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
-from neuralocks_core.flags import flag
 from neuralocks_core.preview import pictures as drawing
 from neuralocks_core.preview.film import AZIMUTH
 from neuralocks_core.progress import Progress

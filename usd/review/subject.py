@@ -11,9 +11,9 @@ from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.evaluation import comparison
 from neuralocks_core.evaluation.pose_energies import energies, stretch_energy
 from neuralocks_core.materials import Material
+from neuralocks_core.models.network_sizes import K
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import GRAVITY, Clip, G
-from neuralocks_core.network_sizes import K
-from neuralocks_core.runtime import StrandModel
 from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.centreline import passes, smoothed
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, strands_on

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from neuralocks_core.arguments import flag
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
-from neuralocks_core.flags import flag
+from neuralocks_core.models.shortcomings import shortcomings
 from neuralocks_core.progress import Progress
 from neuralocks_core.rig.network import RigModel
-from neuralocks_core.shortcomings import shortcomings
 from neuralocks_core.wind import check_felt
 
 from ..border.amounts import check_number

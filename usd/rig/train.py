@@ -4,12 +4,12 @@
 from collections.abc import Callable
 
 from neuralocks_core.anatomy.joint_names import leaf
+from neuralocks_core.arguments import flag
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
-from neuralocks_core.flags import flag
+from neuralocks_core.models.shortcomings import shortcomings
 from neuralocks_core.progress import Progress
-from neuralocks_core.shortcomings import shortcomings
 
 from ..border.amounts import check_number
 from ..border.command_line import command_line

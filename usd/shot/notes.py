@@ -9,12 +9,12 @@ import numpy as np
 from pxr import Pcp, Usd, UsdGeom
 
 from neuralocks_core.anatomy.joint_names import leaf
-from neuralocks_core.boundary import joints_read
-from neuralocks_core.boundary_spec import POSE_JOINTS
+from neuralocks_core.boundary.history import joints_read
+from neuralocks_core.boundary.spec import POSE_JOINTS
+from neuralocks_core.boundary.stepped import Stepped
 from neuralocks_core.character import HEAD_WIDTHS, Character
 from neuralocks_core.rig.hair_names import says_hair
 from neuralocks_core.rotation import flat
-from neuralocks_core.stepped import Stepped
 
 from ..border.damage import text_of
 from ..border.stage_files import unsaved

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict
 
-from neuralocks_core.model import REMEDIES
+from neuralocks_core.models.model_file import REMEDIES
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import RigModel
 from neuralocks_core.rig.rods import RigMaterial

@@ -8,11 +8,11 @@ import numpy as np
 
 from neuralocks_core.body.enclosed import proven_distances
 from neuralocks_core.body.surface_samples import nearest
+from neuralocks_core.models.runtime import cores
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_vector
-from neuralocks_core.runtime import cores
 from neuralocks_core.training.rig.body import KEPT, BodyPatch
 
 RANGE = np.radians([60.0, 80.0, 45.0])

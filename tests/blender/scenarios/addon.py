@@ -107,16 +107,16 @@ def a_part_again(folder: Path) -> None:
 
 def model_of_another_body(folder: Path) -> None:
     """The panel tells if live hair's model was trained on a body of other measures, and which measure differs."""
-    from neuralocks_core import model
+    from neuralocks_core.models import model_file
 
-    shipped, rig = model.read(model.shipped("strands")), scenes.armature()
+    shipped, rig = model_file.read(model_file.shipped("strands")), scenes.armature()
     scenes.body(rig)
     scenes.dance(rig)
     strands = scenes.hair(rig, 10)
     for measures, told in ((None, False), ({"lowest": [0.5] * 10, "highest": [0.6] * 10}, True)):
         card = {**shipped.meta["training"], "measures": measures}
         name = folder / f"{told}.neuralocks"
-        model.write(name, {**shipped.meta, "training": card}, shipped.graphs)
+        model_file.write(name, {**shipped.meta, "training": card}, shipped.graphs)
         make_live(rig, strands, model=str(name))
         said = " ".join(drawn())
         assert ("was trained on another body: " in said and "(trained: 0.5 to 0.6)" in said) == told, said

@@ -10,7 +10,7 @@ import numpy as np
 
 from dcc_addon.scene.hair import curves
 from dcc_addon.scene.hair.nodes import geometry_nodes
-from neuralocks_core.model import shipped
+from neuralocks_core.models.model_file import shipped
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, choose, make_live, messages, points_at
 

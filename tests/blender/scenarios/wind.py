@@ -111,7 +111,7 @@ def character_deleted(folder: Path) -> None:
     strands = scenes.hair(rig, 20)
     make_live(rig, strands)
     rig.neuralocks_character.wind = 3.0
-    with patch("neuralocks_core.runtime.StrandModel.feels_wind", False):
+    with patch("neuralocks_core.models.runtime.StrandModel.feels_wind", False):
         assert "hair feels no wind" in " ".join(drawn())
         bpy.data.objects.remove(rig)
         assert "hair feels no wind" not in " ".join(drawn())

@@ -9,8 +9,8 @@ import pytest
 from neuralocks_core.animation.cuts import find_cuts, find_flashes
 from neuralocks_core.animation.gestures import KINDS
 from neuralocks_core.animation.random_motion import scripted_clip
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.motion import Clip
 from neuralocks_core.rig import rig_spec
 from neuralocks_core.rotation import from_vector

@@ -10,7 +10,7 @@ from neuralocks_core.deformation.lengths import keep_lengths
 from neuralocks_core.deformation.spans import LEFT_OVER, weights
 from neuralocks_core.deformation.turning import turned
 from neuralocks_core.groom import Groom
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.rotation import transformed
 from neuralocks_core.strands.arclength import arc_lengths
 from neuralocks_core.strands.strand_set import strand_set

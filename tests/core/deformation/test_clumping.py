@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.materials import RANGES, Material
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.strands.strand_set import StrandSet
 from tests.core.rigs import moved, person
 

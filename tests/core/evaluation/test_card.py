@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from neuralocks_core import model
+from neuralocks_core.models import model_file
 
 ROOT = Path(__file__).resolve().parents[3]
 TEXT = (ROOT / "docs/ablations.md").read_text(encoding="utf-8")
-SHIPPED = (model.shipped(), *model.specialists())
+SHIPPED = (model_file.shipped(), *model_file.specialists())
 
 
 @pytest.fixture(scope="module")
@@ -21,11 +21,11 @@ def card():
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_the_cards_in_the_shipped_models_are_what_the_docs_measured(card, path):
-    assert model.read(path).meta["report"] == card["report"](TEXT, path.stem), "run benchmarks/card.py"
+    assert model_file.read(path).meta["report"] == card["report"](TEXT, path.stem), "run benchmarks/card.py"
 
 
 def test_each_row_is_in_the_card_of_one_model(card):
-    reports = [model.read(path).meta["report"] for path in SHIPPED]
+    reports = [model_file.read(path).meta["report"] for path in SHIPPED]
     for each in card["TABLES"]:
         told = [name for report in reports for name in report.get(each.name, ())]
         assert sorted(told) == sorted(card["table"](TEXT, each.heading)), each.name
@@ -35,7 +35,7 @@ def test_each_row_is_in_the_card_of_one_model(card):
 def test_a_card_has_all_that_an_aim_is_set_for(card):
     """And of hairstyles also the error of the tips."""
     for path in SHIPPED:
-        report = model.read(path).meta["report"]
+        report = model_file.read(path).meta["report"]
         for each in (*card["TABLES"], card["OTHERS"]):
             wanted = {"position, %", "motion error", "velocity error", "motion ratio", each.inside}
             wanted |= {"tips, %"} if each.heading.startswith("The shipped") else set()
@@ -46,8 +46,8 @@ def test_a_card_has_all_that_an_aim_is_set_for(card):
 
 def test_each_hairstyle_stands_beside_rigid_hair_and_a_static_net(card):
     rows = {}
-    for path in model.specialists():
-        rows |= model.read(path).meta["report"][card["TABLES"][0].name]
+    for path in model_file.specialists():
+        rows |= model_file.read(path).meta["report"][card["TABLES"][0].name]
     assert len(rows) == 12
     for style, row in rows.items():
         assert row["position, %"] < row["position of rigid hair, %"], style
@@ -56,7 +56,7 @@ def test_each_hairstyle_stands_beside_rigid_hair_and_a_static_net(card):
 
 
 def test_the_model_for_all_hair_tells_what_it_does_to_hair_that_others_move(card):
-    report = model.read(model.shipped()).meta["report"]
+    report = model_file.read(model_file.shipped()).meta["report"]
     assert set(report) == {card["OTHERS"].name, "falls short"} and "which other models move" in card["OTHERS"].name
     assert sorted(report[card["OTHERS"].name]) == sorted(card["ARTISTS"])
     assert any(line.startswith("motion error") for line in report["falls short"])
@@ -66,14 +66,14 @@ def test_the_command_changes_reports_alone(card, tmp_path, monkeypatch):
     """Also of models whose report was emptied, as means and livelier models are; a gauge of a training is kept."""
     gauge = {"motion": 0.4}
     for path in SHIPPED:
-        file = model.read(shutil.copy(path, tmp_path))
-        model.write(file.path, {**file.meta, "report": {"held out": gauge, "by style": {"old": {}}}}, file.graphs)
+        file = model_file.read(shutil.copy(path, tmp_path))
+        model_file.write(file.path, {**file.meta, "report": {"held out": gauge, "by style": {"old": {}}}}, file.graphs)
     copies = [tmp_path / path.name for path in SHIPPED]
-    monkeypatch.setattr(model, "shipped", lambda: copies[0])
-    monkeypatch.setattr(model, "specialists", lambda: tuple(copies[1:]))
+    monkeypatch.setattr(model_file, "shipped", lambda: copies[0])
+    monkeypatch.setattr(model_file, "specialists", lambda: tuple(copies[1:]))
     card["main"]()
     for path, copy in zip(SHIPPED, copies, strict=True):
-        before, after = model.read(path), model.read(copy)
+        before, after = model_file.read(path), model_file.read(copy)
         assert after.graphs == before.graphs and abs(copy.stat().st_size - path.stat().st_size) < 1000
         report = {"held out": gauge, **before.meta["report"]}
         assert after.meta == {**before.meta, "report": report}

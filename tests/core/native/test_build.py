@@ -8,10 +8,10 @@ import pytest
 
 from neuralocks_core.body import moving_skin, near_body
 from neuralocks_core.deformation import laying, lengths, spans
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.native import build, library
 from neuralocks_core.native.body import MOST_NEIGHBOURS, VERTICES
 from neuralocks_core.native.library import FOLDER, file_for
-from neuralocks_core.network_sizes import K
 
 BEGIN = {"linux": b"\x7fELF", "windows": b"MZ", "macos": b"\xcf\xfa\xed\xfe"}
 

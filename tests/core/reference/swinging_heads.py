@@ -4,7 +4,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 
 
 def sphere(radius=0.098):

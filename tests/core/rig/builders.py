@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig import RigModel, SkinnedMesh, find_chains, rig_spec
 from neuralocks_core.rig.network import held_features

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models import model_file
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.graph import rig_graph

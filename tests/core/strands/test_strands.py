@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from neuralocks_core.groom import Groom
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.reference.rest import rest_rods
 from neuralocks_core.strands.centreline import centre_lines
 from neuralocks_core.strands.strand_set import StrandSet, root_frames, root_uv, scalp_local, strand_set

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core.deformation.strand_session import strand_inputs
-from neuralocks_core.network_sizes import CODE
+from neuralocks_core.models.network_sizes import CODE
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")

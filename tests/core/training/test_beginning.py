@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models import model_file
 from tests.core.rigs import person, straight_hair
 from tests.strand_models import without_rest_points
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
-from neuralocks_core.boundary_spec import BoundarySpec
-from neuralocks_core.network_sizes import PLAIN_STRAND, STRAND
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.models.network_sizes import PLAIN_STRAND, STRAND
 from neuralocks_core.training import methods
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.beginning import Beginning
@@ -48,7 +48,7 @@ def _written(path, motion="modulated", output="direction", principal=True, stran
     coder = StrandAutoencoder(principal=principal)
     coder.set_normalisation(torch.randn(100, 72))
     meta = {"kind": "strands", "boundary": SPEC.to_json(), "anchored": True, "static": False, "output": output}
-    return model.write(path, {**meta, "credits": ["Hair: Rapunzel."]}, strand_graphs(coder, net, output))
+    return model_file.write(path, {**meta, "credits": ["Hair: Rapunzel."]}, strand_graphs(coder, net, output))
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_the_network_answers_as_the_model_does(tmp_path, motion, principal, maps
     beginning.fill(net)
     for seed in (0, 1):  # what the model never saw vary, and what the network's samples do not
         strands[:, PLAIN_STRAND - 1 - seed], frames[:, seed] = torch.linspace(0, 1, 50), -2
-    graphs = model.read(path).graphs
+    graphs = model_file.read(path).graphs
     again = strand_graphs(beginning.coder(), net, "direction")
     shapes = 0.1 * torch.randn(9, 72).numpy()
     codes = [_run(g["encoder.onnx"], {"shape": shapes})["code"] for g in (graphs, again)]
@@ -88,16 +88,16 @@ def test_with_a_shorter_history_the_network_answers_as_the_model_does_where_noth
     beginning.check(short, RegressionOptions(motion=motion), resume=False)
     beginning.fill(net)
     longer = torch.nn.functional.pad(frames[:1], (0, SPEC.size - short.size)).numpy()
-    wanted = _offsets(model.read(path).graphs, strands.numpy(), longer)
+    wanted = _offsets(model_file.read(path).graphs, strands.numpy(), longer)
     answer = _offsets(strand_graphs(beginning.coder(), net, "direction"), strands.numpy(), frames[:1].numpy())
     assert np.abs(answer - wanted).max() < 1e-3 * np.abs(wanted).max()
 
 
 def test_a_model_that_reads_no_rest_points_is_begun_with(tmp_path):
     path = _written(tmp_path / "a.neuralocks")
-    file = model.read(path)
+    file = model_file.read(path)
     graphs = without_rest_points(file.graphs)
-    model.write(path, file.meta, graphs)
+    model_file.write(path, file.meta, graphs)
     net, strands, frames = _normalised("modulated", 1, strand_map="deep")
     beginning = Beginning(path)
     beginning.check(SPEC, RegressionOptions(), resume=False)
@@ -143,10 +143,10 @@ def test_a_model_of_another_kind_is_refused_before_anything_is_simulated(tmp_pat
 def test_damaged_and_hostile_models_are_refused(tmp_path):
     """Files that are not graphs, lack a layer, or have their numbers in another file or of other sizes."""
     path = _written(tmp_path / "a.neuralocks")
-    whole = model.read(path)
+    whole = model_file.read(path)
 
     def with_frame(data):
-        return model.write(tmp_path / "b.neuralocks", whole.meta, whole.graphs | {"frame.onnx": data})
+        return model_file.write(tmp_path / "b.neuralocks", whole.meta, whole.graphs | {"frame.onnx": data})
 
     graph = onnx.load_model_from_string(whole.graphs["frame.onnx"])
     outside, lacking, small = onnx.ModelProto(), onnx.ModelProto(), onnx.ModelProto()
@@ -181,7 +181,7 @@ def test_a_static_network_stays_static(tmp_path):
     net.frame_scale[SPEC.slices["history"]] = 0
     coder = StrandAutoencoder()
     meta = {"kind": "strands", "boundary": SPEC.to_json(), "anchored": True, "static": True, "output": "direction"}
-    path = model.write(tmp_path / "still.neuralocks", meta, strand_graphs(coder, net, "direction"))
+    path = model_file.write(tmp_path / "still.neuralocks", meta, strand_graphs(coder, net, "direction"))
     again, _, _ = _normalised("modulated", 1)
     again.frame_scale[SPEC.slices["history"]] = 0
     Beginning(path).fill(again)
@@ -214,7 +214,7 @@ def test_a_training_goes_on_where_the_model_was(few, in_one_process, tmp_path, m
     path = train_strands(scene, tmp_path / "a.neuralocks", first, rollouts=4, credits=("Hair: Rapunzel.",))
     still = RegressionOptions(steps=1, clips=2, strands=2, rate=0.0)
     begun = train_strands(scene, tmp_path / "b.neuralocks", still, rollouts=4, begin=path, credits=("Motion: none.",))
-    before, after = (model.read(p).meta for p in (path, begun))
+    before, after = (model_file.read(p).meta for p in (path, begun))
     for name, value in before["report"]["held out"].items():
         assert after["report"]["held out"][name] == pytest.approx(value, abs=2e-3, rel=2e-3), name
     assert set(before["report"]) == {"held out"}
@@ -236,5 +236,5 @@ def test_a_training_goes_on_where_the_model_was(few, in_one_process, tmp_path, m
         train_strands(scene, tmp_path / "c.neuralocks", still, rollouts=4, begin=path, progress=kill)
     path.unlink()
     resumed = train_strands(scene, tmp_path / "c.neuralocks", still, rollouts=4, resume=True)
-    assert model.read(resumed).meta["report"] == after["report"]
+    assert model_file.read(resumed).meta["report"] == after["report"]
     assert not (tmp_path / "c.neuralocks.training").exists()

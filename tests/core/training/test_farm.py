@@ -17,7 +17,7 @@ import pytest
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.training import checkpoint, farm, methods
 from neuralocks_core.training.rollouts import FINEST, Rollout
 

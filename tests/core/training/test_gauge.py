@@ -9,7 +9,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from neuralocks_core.materials import NO_PLANE
-from neuralocks_core.network_sizes import K
+from neuralocks_core.models.network_sizes import K
 from neuralocks_core.training import gauge
 from neuralocks_core.training.farm import Rollout
 from neuralocks_core.training.regression import predicted

@@ -8,10 +8,10 @@ import pytest
 
 from neuralocks_core.animation.gestures import KINDS
 from neuralocks_core.animation.random_motion import scripted_clip
+from neuralocks_core.boundary.smooth_motion import SmoothMotion
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.metrics import motion_error
 from neuralocks_core.motion import Clip
-from neuralocks_core.smooth_motion import SmoothMotion
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from neuralocks_core import rotation
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_vectors

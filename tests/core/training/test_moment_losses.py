@@ -13,7 +13,7 @@ from neuralocks_core import rotation
 from neuralocks_core.body.tree_search import surface_tree
 from neuralocks_core.character import Character
 from neuralocks_core.materials import MARGIN, Material
-from neuralocks_core.network_sizes import CODE, STRAND, K
+from neuralocks_core.models.network_sizes import CODE, STRAND, K
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.training import methods
 from neuralocks_core.training.methods import MomentMethod

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from neuralocks_core.network_sizes import STRAND
+from neuralocks_core.models.network_sizes import STRAND
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.networks import RANKS, StrandNet, deform, smoothing

@@ -7,7 +7,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from neuralocks_core.materials import MARGIN
-from neuralocks_core.network_sizes import STRAND, K
+from neuralocks_core.models.network_sizes import STRAND, K
 from neuralocks_core.training.regression_losses import CREEP, STILL, TOGETHER, regression_losses
 from neuralocks_core.training.regression_options import RegressionOptions
 

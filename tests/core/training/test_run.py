@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.network_sizes import STRAND
+from neuralocks_core.models.network_sizes import STRAND
 from neuralocks_core.training import run
 from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.regression_options import RegressionOptions

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.mesh import vertex_normals
@@ -225,12 +225,12 @@ def test_the_papers_own_settings_train(pool, inputs):
 
 def test_one_call_trains_the_papers_way_and_says_so(pool, few, in_one_process, tmp_path):
     pytest.importorskip("warp", reason="the gauge compares with the solver")
-    from neuralocks_core import model
+    from neuralocks_core.models import model_file
     from neuralocks_core.training.train import train_strands
 
     scene = replace(pool.scene, spec=paper_boundary(), frames=34, strands=8)
     options = SelfSupervisedOptions.paper(steps=6, poses=2, strands=8, pool=1)
-    meta = model.read(train_strands(scene, tmp_path / "paper.neuralocks", options)).meta
+    meta = model_file.read(train_strands(scene, tmp_path / "paper.neuralocks", options)).meta
     assert meta["output"] == "displacement" and not meta["anchored"]
     assert meta["training"]["method"].startswith("self-supervised") and meta["training"]["steps"] == 6
     assert meta["training"]["options"]["form"] == "direct" and meta["report"]["held out"]["rigid"] > 0

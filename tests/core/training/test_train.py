@@ -6,18 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from neuralocks_core import model
 from neuralocks_core.anatomy.humanoid import Humanoid
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.measures import body_measures
+from neuralocks_core.models import model_file
 from tests.core.rigs import person
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.deformation.strand_session import StrandSession
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.training import checkpoint, methods
 from neuralocks_core.training.farm import load, save
 from neuralocks_core.training.moment_options import SelfSupervisedOptions
@@ -117,8 +117,8 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(
             save(folder / f"{index:06d}.npz", RolloutMaker(scene).make(index))
         monkeypatch.setattr("neuralocks_core.training.train.discard", lambda work: None)
         train_strands(scene, out, RegressionOptions(steps=6, clips=4, strands=4), rollouts=6)
-        graphs.append(model.read(out).graphs)
-        assert model.read(out).meta["training"]["rollouts"] == 6
+        graphs.append(model_file.read(out).graphs)
+        assert model_file.read(out).meta["training"]["rollouts"] == 6
     assert graphs[0] == graphs[1]
 
 
@@ -132,7 +132,7 @@ def test_hair_learns_to_move_in_a_minute(scene, tmp_path, monkeypatch):
     path = train_strands(
         scene, tmp_path / "hair.neuralocks", options, rollouts=40, progress=lambda *a: messages.append(a)
     )
-    report = model.read(path).meta["report"]["held out"]
+    report = model_file.read(path).meta["report"]["held out"]
     assert report["motion"] < 0.7
     assert 0.5 < report["motion_ratio"] < 1.3
     assert report["position"] < 0.6 * report["rigid"]
@@ -173,7 +173,7 @@ def test_a_killed_run_goes_on(scene, few, tmp_path, monkeypatch):
         train_strands(scene, out, short, rollouts=8, resume=True, progress=kill_late)
     assert not out.exists() and (work / "checkpoint.npz").exists() and made.items() <= kept().items()
     train_strands(scene, out, short, rollouts=8, resume=True)
-    assert model.read(out).meta["training"]["steps"] >= 20
+    assert model_file.read(out).meta["training"]["steps"] >= 20
 
 
 def test_what_cannot_be_resumed_says_why(scene, tmp_path):
@@ -235,7 +235,7 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, few, in_one_process, 
         train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4)
     assert out.read_bytes() == before
     train_strands(scene, out, RegressionOptions(steps=4, **tiny), rollouts=4, resume=True, keep_work=True)
-    card = model.read(out).meta["training"]
+    card = model_file.read(out).meta["training"]
     assert card["steps"] == 4 and "resumed with other options" not in card
     lowest, own, highest = card["measures"]["lowest"], body_measures(scene.character), card["measures"]["highest"]
     assert np.all(lowest <= own + 1e-4) and np.all(own <= np.add(highest, 1e-4))
@@ -243,7 +243,7 @@ def test_a_training_is_resumed_as_it_was_begun_only(scene, few, in_one_process, 
     other = RegressionOptions(steps=6, collision=9.0, **tiny)
     train_strands(scene, out, other, rollouts=4, resume=True, tell=told.extend)
     assert len(told) == 1 and "continues with other options than it began with: collision 9.0 after 45.0" in told[0]
-    assert model.read(out).meta["training"]["resumed with other options"] == ["collision 9.0 after 45.0"]
+    assert model_file.read(out).meta["training"]["resumed with other options"] == ["collision 9.0 after 45.0"]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core.animation.random_motion import scripted_clip
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.skinned_body import Body

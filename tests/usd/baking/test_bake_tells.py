@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom
 
-from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models import model_file
 from usd.baking.bake import bake
 from usd.baking.join import join
 from usd.baking.simulate import simulate

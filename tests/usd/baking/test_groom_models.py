@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd
 
-from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models import model_file
+from neuralocks_core.models.runtime import StrandModel
 from usd.baking import groom_models
 from usd.baking.bake import bake
 from usd.border.stage_files import open_stage

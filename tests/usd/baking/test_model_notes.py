@@ -8,7 +8,7 @@ import pytest
 
 from neuralocks_core.materials import Material
 from neuralocks_core.measures import body_measures
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.runtime import StrandModel
 from usd.baking.bake import bake
 from usd.baking.model_notes import model_notes
 from usd.review.inspect import inspect

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf
 
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from tests.strand_models import write_random_model
 from usd.baking.bake import bake

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import typer
 
-from neuralocks_core import model as model_file
 from neuralocks_core.json_values import plain
+from neuralocks_core.models import model_file
 from neuralocks_core.preview.pictures import CLIP_SIZE, STRIP_SIZE
 from usd.assets.groom import write_groom
 from usd.assets.importing import import_groom
@@ -209,7 +209,7 @@ def test_the_runtime_imports_only_what_inference_needs():
               "scipy.stats", "scipy.signal", "scipy.ndimage", "scipy.integrate")  # fmt: skip
     code = f"import sys; import %s; print([m for m in {absent} if m in sys.modules])"
     for module in (
-        "neuralocks_core.runtime, neuralocks_core.deformation.resolve",
+        "neuralocks_core.models.runtime, neuralocks_core.deformation.resolve",
         "usd.baking.bake, usd.baking.posing, usd.shot.stage",
     ):
         command = [sys.executable, "-c", code % module]

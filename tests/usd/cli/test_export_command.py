@@ -4,7 +4,7 @@
 import json
 from pathlib import Path
 
-from neuralocks_core import model as model_file
+from neuralocks_core.models import model_file
 
 from ..commands import status
 from ..shots import write_shot

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from neuralocks_core import model as model_file
+from neuralocks_core.models import model_file
 
 from ...strand_models import write_random_model
 from ..commands import status

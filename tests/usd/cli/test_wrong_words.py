@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from neuralocks_core import model as model_file
+from neuralocks_core.models import model_file
 from usd.cli.command import one_line, say
 
 from ..commands import status

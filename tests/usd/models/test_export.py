@@ -9,8 +9,8 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from neuralocks_core import model as model_file
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.models import model_file
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_vector

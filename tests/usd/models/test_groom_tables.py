@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 
-from neuralocks_core import model as model_file
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models import model_file
+from neuralocks_core.models.runtime import StrandModel
 from usd.models.groom_tables import export_grooms, file_names, tables
 from usd.shot.stage import read_shot
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-from neuralocks_core import model
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models import model_file
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
@@ -32,14 +32,14 @@ LIKE, STILL, PAPER = RegressionOptions(), RegressionOptions(static=True), SelfSu
 
 
 def test_left_out_it_is_the_shipped_model_where_that_fits():
-    assert begins_with(None, False, SPEC, LIKE) == model.shipped()
+    assert begins_with(None, False, SPEC, LIKE) == model_file.shipped()
     for spec, options in ((OTHER, LIKE), (SPEC, STILL), (SPEC, PAPER)):
         assert begins_with(None, False, spec, options) is None
     assert begins_with(None, True, SPEC, LIKE) is None, "a resumed training has its own beginning"
 
 
 def test_what_is_named_is_taken_or_refused(tmp_path):
-    assert begins_with("shipped", False, SPEC, LIKE) == model.shipped()
+    assert begins_with("shipped", False, SPEC, LIKE) == model_file.shipped()
     assert begins_with("nothing", False, SPEC, LIKE) is None
     with pytest.raises(NeuralocksError, match="strands.neuralocks: differs from this training in static"):
         begins_with("shipped", False, SPEC, STILL)
@@ -70,7 +70,7 @@ def test_every_word_is_looked_at_before_a_style_grows(words, fact, tmp_path):
     [
         (["coils"], "shipped", "strands_coily"),
         (["coils", "bob"], None, "strands"),
-        (["coils"], str(model.shipped()), "strands"),
+        (["coils"], str(model_file.shipped()), "strands"),
     ],
 )
 def test_of_the_shipped_models_it_is_the_one_that_knows_such_hair(grooms, begin, taken, tmp_path, monkeypatch):
@@ -79,7 +79,7 @@ def test_of_the_shipped_models_it_is_the_one_that_knows_such_hair(grooms, begin,
 
     def begins(scene, out, options, begin, **_):
         begun.append(begin.stem)
-        return model.shipped()
+        return model_file.shipped()
 
     monkeypatch.setattr("neuralocks_core.training.train.train_strands", begins)
     monkeypatch.setattr("usd.models.training_scene.MOST_STRANDS", 40)

@@ -3,12 +3,12 @@
 
 import pytest
 
-from neuralocks_core import model
+from neuralocks_core.models import model_file
 from usd.review.facts_text import as_text
 from usd.review.inspect import inspect
 
 
-@pytest.mark.parametrize("path", (model.shipped(), *model.specialists()), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", (model_file.shipped(), *model_file.specialists()), ids=lambda path: path.stem)
 def test_a_shipped_model_has_no_empty_heading(path):
     lines = as_text(inspect(path)).splitlines()
     pads = [len(line) - len(line.lstrip()) for line in lines]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-from neuralocks_core import model as model_file
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models import model_file
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_vector

@@ -6,7 +6,7 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models.runtime import StrandModel
 from usd.shot.stage import read_shot
 from usd.skel.joints import JointSource
 

@@ -8,9 +8,9 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
-from neuralocks_core.runtime import StrandModel
 from usd.border.time_codes import time_codes
 from usd.shot.notes import out_of_range
 from usd.shot.stage import read_rigs, read_shot

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from neuralocks_core import rotation
+from neuralocks_core.boundary.smooth_motion import SmoothMotion
+from neuralocks_core.boundary.track import Track
 from neuralocks_core.motion import Clip
-from neuralocks_core.smooth_motion import SmoothMotion
-from neuralocks_core.track import Track
 
-from . import rigs
+from .. import rigs
 
 TIMES = np.arange(25) / 24
 

@@ -1,9 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays of numbers that a caller gives for an argument."""
+"""What callers give for an argument: a whole number, true or false, an array of numbers."""
+
+import math
+from numbers import Integral
 
 import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
+
+
+def is_whole(given, low: float = -math.inf, high: float = math.inf) -> bool:
+    """Whether something is a whole number from `low` to `high`. True and False, which Python counts as 1 and 0, are not."""
+    return isinstance(given, Integral) and not isinstance(given, bool) and low <= given <= high
+
+
+def flag(name: str, given) -> bool:
+    """What a caller gives for an argument that is either true or false. Words are refused, for Python counts 'false' as true.
+
+    Raises:
+        NeuralocksError: it is neither; the message begins with the argument's name.
+    """
+    if not isinstance(given, bool | np.bool_):
+        raise NeuralocksError(f"{name} {given!r}: must be True or False")
+    return bool(given)
 
 
 def number_array(name: str, given, wanted: str, kind=np.float64) -> np.ndarray:

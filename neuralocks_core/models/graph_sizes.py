@@ -14,7 +14,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from neuralocks_core.protobuf import fields, numbers
+from neuralocks_core.models.protobuf import fields, numbers
 
 MANY = 100_003
 """Rows of the inputs whose number is open, such as strands."""

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
+from neuralocks_core.models.shortcomings import shortcomings
 from neuralocks_core.rig.network import RigModel
-from neuralocks_core.shortcomings import shortcomings
 
 SPRINGS = {"spring bones, best of 12 settings": 0.78, "spring bones, VRM's defaults": 1.7}
 

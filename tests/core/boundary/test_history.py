@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from neuralocks_core import rotation
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.boundary.sudden_stops import softened
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.materials import Material
 from neuralocks_core.motion import Clip
-from neuralocks_core.sudden_stops import softened
 from neuralocks_core.wind import Wind
 from tests.core.rig.builders import character as with_elbows
 from tests.core.rigs import HEAD, bind, moved, person

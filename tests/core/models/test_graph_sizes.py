@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
-from neuralocks_core import model
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.graph_check import odd_part
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models import model_file
+from neuralocks_core.models.graph_check import odd_part
+from neuralocks_core.models.runtime import StrandModel
 
 onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 F, I = onnx.TensorProto.FLOAT, onnx.TensorProto.INT64
@@ -57,9 +57,9 @@ def test_what_grows_beyond_all_of_ours_is_refused(bomb):
 
 
 def test_it_is_refused_before_it_is_loaded(tmp_path):
-    file = model.read(model.shipped())
+    file = model_file.read(model_file.shipped())
     graphs = file.graphs | {"tail.onnx": _graph(*BOMBS["doubled again and again"])}
-    path = model.write(tmp_path / "bomb.neuralocks", file.meta, graphs)
+    path = model_file.write(tmp_path / "bomb.neuralocks", file.meta, graphs)
     with pytest.raises(NeuralocksError, match="bomb.neuralocks: tail.onnx has arrays too large, as no model"):
         StrandModel.load(path)
 

@@ -5,8 +5,8 @@ Others could run for ever, fill the memory, draw random numbers or read other fi
 are those of onnx.proto, because the package onnx is not needed to run a model.
 """
 
-from neuralocks_core.graph_sizes import OPERATIONS, oversized
-from neuralocks_core.protobuf import fields
+from neuralocks_core.models.graph_sizes import OPERATIONS, oversized
+from neuralocks_core.models.protobuf import fields
 
 _GRAPH, _FUNCTIONS = 7, 25
 """Fields of ModelProto. A function may have the name of an operation."""

@@ -8,10 +8,10 @@ import pytest
 
 from neuralocks_core import rotation
 from neuralocks_core.animation.cuts import find_cuts
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.boundary.stepped import Stepped
 from neuralocks_core.motion import Clip
-from neuralocks_core.stepped import Stepped
 from tests.core.rigs import HEAD, moved, person
 
 FRAMES = np.arange(48)

@@ -8,14 +8,15 @@ import sys
 import numpy as np
 import pytest
 
-from neuralocks_core import materials, model, runtime
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core import materials
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.deformation.clumping import Locks
 from neuralocks_core.deformation.strand_session import StrandSession, strand_inputs
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES
-from neuralocks_core.network_sizes import PLAIN_STRAND
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models import model_file, runtime
+from neuralocks_core.models.network_sizes import PLAIN_STRAND
+from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.strands.strand_set import scalp_local
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
@@ -96,13 +97,13 @@ def test_what_the_network_does_not_read_is_named(path, strands):
 
 
 def test_a_model_that_reads_no_rest_points_is_given_none(path, net, strands, tmp_path):
-    file = model.read(path)
-    plain = model.write(tmp_path / "plain.neuralocks", file.meta, without_rest_points(file.graphs))
+    file = model_file.read(path)
+    plain = model_file.write(tmp_path / "plain.neuralocks", file.meta, without_rest_points(file.graphs))
     vector = np.random.default_rng(1).normal(size=SPEC.size).astype(np.float32)
     unread = net[0].strand.weight[:, PLAIN_STRAND:].clone()
     with torch.no_grad():
         net[0].strand.weight[:, PLAIN_STRAND:] = 0
-        same = model.write(tmp_path / "same.neuralocks", file.meta, strand_graphs(net[1], net[0], path.stem))
+        same = model_file.write(tmp_path / "same.neuralocks", file.meta, strand_graphs(net[1], net[0], path.stem))
         net[0].strand.weight[:, PLAIN_STRAND:] = unread
     moved = [StrandSession(StrandModel.load(each), strands).displacement(vector) for each in (plain, same)]
     assert np.abs(moved[0] - moved[1]).max() < 1e-6
@@ -121,11 +122,14 @@ def test_a_model_that_is_read_again_is_not_loaded_again(path, tmp_path):
     """Another of the same description is, even in the same file."""
     file = tmp_path / "copy.neuralocks"
     file.write_bytes(path.read_bytes())
-    one, two = (runtime.graph_session(model.read(each), "tail.onnx") for each in (path, file))
+    one, two = (runtime.graph_session(model_file.read(each), "tail.onnx") for each in (path, file))
     assert one is two
-    changed = {**model.read(file).graphs, "tail.onnx": model.read(model.shipped("strands")).graphs["tail.onnx"]}
-    model.write(file, model.read(file).meta, changed)
-    assert runtime.graph_session(model.read(file), "tail.onnx") is not one
+    changed = {
+        **model_file.read(file).graphs,
+        "tail.onnx": model_file.read(model_file.shipped("strands")).graphs["tail.onnx"],
+    }
+    model_file.write(file, model_file.read(file).meta, changed)
+    assert runtime.graph_session(model_file.read(file), "tail.onnx") is not one
 
 
 def test_the_held_bind_pose_is_exactly_the_groom(path, strands):
@@ -203,7 +207,7 @@ def test_the_runtime_imports_without_torch_usd_or_blender():
     code = (
         "import sys\n"
         "for name in ('torch', 'pxr', 'bpy', 'onnx', 'warp'): sys.modules[name] = None\n"
-        "import neuralocks_core.runtime, neuralocks_core.groom, neuralocks_core.hairstyles, neuralocks_core.formats"
+        "import neuralocks_core.models.runtime, neuralocks_core.groom, neuralocks_core.hairstyles, neuralocks_core.formats"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -211,9 +215,9 @@ def test_the_runtime_imports_without_torch_usd_or_blender():
 def test_nothing_is_reported_and_nothing_kept_in_the_home_folder(tmp_path):
     """By default, onnxruntime reports to its maker what was run, from a database and an identifier that it puts there."""
     code = (
-        "from neuralocks_core import model\n"
-        "from neuralocks_core.runtime import graph_session\n"
-        "graph_session(model.read(model.shipped('strands')), 'tail.onnx')"
+        "from neuralocks_core.models import model_file\n"
+        "from neuralocks_core.models.runtime import graph_session\n"
+        "graph_session(model_file.read(model_file.shipped('strands')), 'tail.onnx')"
     )
     silent = ("CI", "GITHUB_ACTIONS", "ORT_DISABLE_TELEMETRY", "ORT_RUNNING_UNIT_TESTS", "XDG_CACHE_HOME")
     environment = {name: value for name, value in os.environ.items() if name not in silent}

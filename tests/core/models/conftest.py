@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from neuralocks_core import model
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.groom import Groom
+from neuralocks_core.models import model_file
 from neuralocks_core.strands.strand_set import strand_set
 
 SPEC = BoundarySpec()
@@ -32,7 +32,7 @@ def path(request, net, tmp_path_factory):
 
     meta = {"kind": "strands", "boundary": SPEC.to_json(), "anchored": True, "output": request.param}
     file = tmp_path_factory.mktemp("model") / f"{request.param}.neuralocks"
-    return model.write(file, meta, strand_graphs(net[1], net[0], request.param))
+    return model_file.write(file, meta, strand_graphs(net[1], net[0], request.param))
 
 
 @pytest.fixture(scope="module")

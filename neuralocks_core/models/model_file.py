@@ -12,7 +12,7 @@ from pathlib import Path
 
 from neuralocks_core.errors import NeuralocksError, fact_of
 from neuralocks_core.files import as_path, atomic_write
-from neuralocks_core.shortcomings import shortcomings
+from neuralocks_core.models.shortcomings import shortcomings
 
 FORMAT = 1
 SUFFIX = ".neuralocks"
@@ -62,7 +62,7 @@ def shipped(kind: str = "strands") -> Path:
     Raises:
         NeuralocksError: this installation lacks it.
     """
-    path = Path(__file__).parent / "shipped" / f"{kind}{SUFFIX}"
+    path = Path(__file__).parents[1] / "shipped" / f"{kind}{SUFFIX}"
     if not path.is_file():
         raise NeuralocksError(
             f"{path.name}: the shipped model is missing from this installation; reinstall or give --model"
@@ -73,7 +73,7 @@ def shipped(kind: str = "strands") -> Path:
 @cache
 def specialists() -> tuple[Path, ...]:
     """Paths of the shipped strand models that know some styles better than `shipped()`; see `deformation.suited`."""
-    return tuple(sorted((Path(__file__).parent / "shipped").glob(f"strands_*{SUFFIX}")))
+    return tuple(sorted((Path(__file__).parents[1] / "shipped").glob(f"strands_*{SUFFIX}")))
 
 
 def kind_known(path: Path) -> str:

@@ -13,17 +13,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from neuralocks_core import model as model_file
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.arguments import is_whole, number_array
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, about, fact_of
-from neuralocks_core.graph_check import odd_part
 from neuralocks_core.measures import another_body, known_body
+from neuralocks_core.models import model_file
+from neuralocks_core.models.graph_check import odd_part
+from neuralocks_core.models.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND
 from neuralocks_core.motion import Clip
-from neuralocks_core.network_sizes import CODE, HIDDEN, PLAIN_STRAND, SHAPE, STRAND
-from neuralocks_core.number_arrays import number_array
-from neuralocks_core.whole_numbers import is_whole
 
 CHUNK = 512
 """Strands in one call: half a megabyte of hidden values, which stay in a core's second-level cache. Fixed, so that results
@@ -59,7 +58,7 @@ class StrandModel:
         strand_size: how many numbers of `strand_session.strand_inputs` it reads, from the first.
 
     Args:
-        file: a model read by `model.read`.
+        file: a model read by `model_file.read`.
         threads: number of chunks of strands processed at a time, by default one a core; the result does not depend on it.
 
     Raises:

@@ -4,8 +4,8 @@
 import numpy as np
 
 from neuralocks_core import rotation
+from neuralocks_core.boundary.clip_spline import ClipSpline
 from neuralocks_core.character import Character
-from neuralocks_core.clip_spline import ClipSpline
 from neuralocks_core.motion import Clip
 
 

@@ -6,12 +6,12 @@ import json
 import numpy as np
 import pytest
 
-from neuralocks_core import model
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import RANGES
-from neuralocks_core.runtime import StrandModel
+from neuralocks_core.models import model_file
+from neuralocks_core.models.runtime import StrandModel
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 from tests.strand_models import rewritten
@@ -60,7 +60,7 @@ def test_damaged_models_are_refused_in_one_line(path, tmp_path, changes, fact):
 
 
 def test_graphs_in_each_others_place_are_refused(path, tmp_path):
-    graphs = model.read(path).graphs
+    graphs = model_file.read(path).graphs
     changes = {"encoder_onnx": graphs["strand.onnx"], "strand_onnx": graphs["encoder.onnx"]}
     with pytest.raises(NeuralocksError, match=r"encoder.onnx reads strand \(142\), not shape \(72\); get"):
         StrandModel.load(rewritten(path, tmp_path / "m.neuralocks", **changes))
@@ -77,7 +77,7 @@ def encoder(onnx, nodes, constants=()):
 def test_a_graph_that_fails_while_it_is_computed_is_one_line(path, strands, tmp_path, monkeypatch):
     """As one would whose shapes nobody had looked at before."""
     onnx = pytest.importorskip("onnx")
-    monkeypatch.setattr("neuralocks_core.graph_check.oversized", lambda graph: False)
+    monkeypatch.setattr("neuralocks_core.models.graph_check.oversized", lambda graph: False)
     nodes = [onnx.helper.make_node("Reshape", ["shape", "rows"], ["code"])]
     graph = encoder(onnx, nodes, [onnx.helper.make_tensor("rows", onnx.TensorProto.INT64, [2], [7, 32])])
     broken = rewritten(path, tmp_path / "m.neuralocks", encoder_onnx=graph.SerializeToString())
@@ -91,7 +91,7 @@ def test_graphs_that_are_none_of_ours_are_never_loaded(path, tmp_path):
     onnx = pytest.importorskip("onnx")
     node = onnx.helper.make_node
     endless, outside, function, foreign = (
-        onnx.load_model_from_string(model.read(path).graphs["encoder.onnx"]) for _ in range(4)
+        onnx.load_model_from_string(model_file.read(path).graphs["encoder.onnx"]) for _ in range(4)
     )
     body = encoder(onnx, [node("Relu", ["shape"], ["code"])]).graph
     endless.graph.node.append(node("Loop", ["", "", "code"], ["all"], body=body))
@@ -110,18 +110,18 @@ def test_graphs_that_are_none_of_ours_are_never_loaded(path, tmp_path):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
-@pytest.mark.parametrize("name", model.KINDS["strands"])
+@pytest.mark.parametrize("name", model_file.KINDS["strands"])
 def test_a_model_that_gives_no_finite_hair_is_refused(path, strands, tmp_path, name, value):
     """Such weights would fill a bake with NaN, and nothing else reports it."""
     onnx = pytest.importorskip("onnx")
-    file = model.read(path)
+    file = model_file.read(path)
     graph = onnx.load_model_from_string(file.graphs[name])
     largest = max(graph.graph.initializer, key=lambda tensor: len(tensor.raw_data))
     array = onnx.numpy_helper.to_array(largest)
     with np.errstate(over="ignore"):  # some are stored in half precision
         largest.CopyFrom(onnx.numpy_helper.from_array(np.full_like(array, value), largest.name))
     graphs = {**file.graphs, name: graph.SerializeToString()}
-    damaged = model.write(tmp_path / "damaged.neuralocks", file.meta, graphs)
+    damaged = model_file.write(tmp_path / "damaged.neuralocks", file.meta, graphs)
     vector = np.ones(SPEC.size, np.float32)
     vector[CLUMPING] = 0
     with pytest.raises(NeuralocksError, match=r"damaged.neuralocks: \w+.onnx gives no finite hair; ") as caught:

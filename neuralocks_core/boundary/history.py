@@ -13,16 +13,16 @@ from numbers import Real
 import numpy as np
 
 from neuralocks_core import rotation
-from neuralocks_core.boundary_spec import MATERIALS, POSE_JOINTS, BoundarySpec
+from neuralocks_core.arguments import number_array
+from neuralocks_core.boundary.spec import MATERIALS, POSE_JOINTS, BoundarySpec
+from neuralocks_core.boundary.stepped import Stepped
+from neuralocks_core.boundary.sudden_stops import softened
+from neuralocks_core.boundary.track import Track
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import UNREAD, at_weight_one
 from neuralocks_core.measures import measures_read
 from neuralocks_core.motion import GRAVITY, Clip, G, time_array
-from neuralocks_core.number_arrays import number_array
-from neuralocks_core.stepped import Stepped
-from neuralocks_core.sudden_stops import softened
-from neuralocks_core.track import Track
 from neuralocks_core.wind import Wind, check_felt
 
 

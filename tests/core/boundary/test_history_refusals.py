@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from neuralocks_core.boundary import BoundarySampler
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import Clip
 from tests.core.rigs import moved, person
