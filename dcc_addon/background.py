@@ -7,7 +7,7 @@ import time
 
 import bpy
 
-from .live import carriers, needs_sampling, refresh
+from .live.view import carriers, needs_sampling, refresh
 from .scene.character.layers import working_in
 from .scene.drawing.redraw import redraw
 from .scene.drawing.windows import drawing, layer_shown, scenes_shown

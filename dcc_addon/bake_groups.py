@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 from neuralocks_core.errors import NeuralocksError
 
-from .blowing import blowing
-from .live_strands import material_words, typed
-from .models import load_model, model_path, named_model
+from .live.blowing import blowing
+from .live.live_strands import material_words, typed
+from .live.models import load_model, model_path, named_model
 from .scene.hair import curves
 from .services.sliders import MOTION
 from .services.wind import Blowing

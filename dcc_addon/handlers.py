@@ -6,9 +6,10 @@ from bpy.app.handlers import persistent
 
 from neuralocks_core.errors import NeuralocksError
 
-from . import background, live, model_updates
-from .live_strands import live_hairs, show_all_rest, show_rest_left
-from .models import SETTING
+from . import background
+from .live import model_updates, view
+from .live.live_strands import live_hairs, show_all_rest, show_rest_left
+from .live.models import SETTING
 from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
 from .scene.baked import as_groomed
 from .scene.baked.attach import switch_changed
@@ -41,9 +42,9 @@ def on_frame(scene, graph=None):
         return
     graph = graph or bpy.context.evaluated_depsgraph_get()
     # What other handlers have posed since is evaluated first. Not for a render: its engine would not learn what has changed.
-    if others_called() and graph.mode == "VIEWPORT" and live.carriers(scene):
+    if others_called() and graph.mode == "VIEWPORT" and view.carriers(scene):
         _unseen(graph.update)
-    live.update(scene, graph, moved=True)
+    view.update(scene, graph, moved=True)
     _catch_up()
 
 
@@ -59,15 +60,15 @@ def on_update(scene, graph):
     switched, session.switched = session.switched, set()
     if session.paused:
         return
-    live.forget_gone()
+    view.forget_gone()
     changed = [update.id for update in graph.updates]
     objects = {thing.name_full: thing.original for thing in changed if isinstance(thing, bpy.types.Object)}
     forget_data(graph)
     make_comparable(objects.values())  # a library may have been reloaded
     show_rest_left(objects.values())
-    if live.bereft(scene):
-        live.update(scene, graph)
-    carriers = live.carriers(scene)
+    if view.bereft(scene):
+        view.update(scene, graph)
+    carriers = view.carriers(scene)
     mark_stale(graph, changed, carriers, switched)
     if not carriers:
         return
@@ -75,7 +76,7 @@ def on_update(scene, graph):
     names, placed = {armature.name_full for armature in carriers}, hair_placed(graph)
     doubt_motions(changed, objects.keys(), names, placed)
     if names & objects.keys() or placed or any(map(edited, objects.values())):
-        live.update(scene, graph)
+        view.update(scene, graph)
     _catch_up()
 
 
@@ -93,7 +94,7 @@ def on_load(*_):
     if own.hairs or own.armatures:
         lock()
     for scene in bpy.data.scenes:
-        if live.needs_sampling(scene):
+        if view.needs_sampling(scene):
             background.request()
 
 
@@ -102,10 +103,10 @@ def on_undo(scene, *_):
     """Undo may have brought back another pose, groom or choice."""
     session.doubt()
     named_from.remember(bpy.data.objects, SETTING.values())
-    live.forget_gone()
-    live.forget_ended()
+    view.forget_gone()
+    view.forget_ended()
     background.request()  # a half-done sampling refers to a scene that no longer exists
-    live.refresh(scene)
+    view.refresh(scene)
     show_rest_left(bpy.data.objects)  # hair as it was before the update that followed a join
 
 
@@ -119,7 +120,7 @@ def before_save(target=None, *_):
     make_comparable(bpy.data.objects)
     as_groomed.keep(bpy.data.objects)
     for scene in bpy.data.scenes:
-        live.show_rest(scene)
+        view.show_rest(scene)
     show_all_rest()
     session.remade = _unseen(lambda: Remade(target or bpy.data.filepath, SETTING.values()))
     named_from.forget(SETTING.values())
@@ -132,7 +133,7 @@ def after_save(*_):
         _unseen(session.remade.put_back)
     named_from.remember(bpy.data.objects, SETTING.values())
     for scene in sorted(bpy.data.scenes, key=lambda scene: scene == bpy.context.scene):
-        live.refresh(scene)
+        view.refresh(scene)
     blurred, session.blurred = session.blurred, []
     for hair in filter(None, map(find, blurred)):
         blur.again(hair)
@@ -153,7 +154,7 @@ def before_render(scene, *_):
     for drawn in drawn_with(scene):
         with working_in(drawn, layer_shown(drawn)):
             _make_ready(drawn)
-        for thing in [*live_hairs(drawn), *live.carriers(drawn)]:
+        for thing in [*live_hairs(drawn), *view.carriers(drawn)]:
             if thing.name_full in session.messages:
                 print(f"Neuralocks: {session.messages[thing.name_full]}")
         for hair in live_hairs(drawn):
@@ -162,13 +163,13 @@ def before_render(scene, *_):
 
 def _make_ready(scene) -> None:
     """Sample what is out of date in this scene, and show its hair."""
-    live.refresh(scene, wait=True, moved=True)
-    for armature in live.carriers(scene):
+    view.refresh(scene, wait=True, moved=True)
+    for armature in view.carriers(scene):
         try:
             ensure(bpy.context, armature)
         except NeuralocksError as error:
             session.messages[armature.name_full] = str(error)
-    live.refresh(scene, wait=True)
+    view.refresh(scene, wait=True)
 
 
 @persistent

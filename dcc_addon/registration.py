@@ -3,7 +3,9 @@
 
 import bpy
 
-from . import background, handlers, live_rig, live_strands, menu, operators, panels, preferences, preparing, properties
+from . import background, handlers, operators
+from .interface import menu, panels, preferences, properties
+from .live import live_rig, live_strands, preparing
 from .session import session
 
 CLASSES = (*properties.CLASSES, *preferences.CLASSES, *operators.CLASSES, *panels.CLASSES, *menu.CLASSES)

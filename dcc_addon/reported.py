@@ -6,8 +6,8 @@ names, as evaluated.
 import bpy
 
 from . import background
-from .edited import touched
-from .live_strands import EDITING, known
+from .live.edited import touched
+from .live.live_strands import EDITING, known
 from .scene.baked import body_known
 from .scene.motion.shapes import follows
 from .scene.objects.keyed import concerns, users_of

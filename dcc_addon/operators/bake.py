@@ -12,8 +12,8 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..bake_files import files_of, output_path, owner_of, shot_beside
 from ..bake_groups import grouped
-from ..live import refresh
-from ..live_strands import show_rest
+from ..live.live_strands import show_rest
+from ..live.view import refresh
 from ..scene.baked import attach
 from ..scene.character.carried import hairs_of
 from ..scene.character.riding import on_hair_bone

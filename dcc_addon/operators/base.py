@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.time_left import TimeLeft
 
 from .. import background
-from ..live import refresh
+from ..live.view import refresh
 from ..scene.files.paths import FILE, check_found
 from ..scene.motion.sampling import in_slices
 from ..scene.motion.up_to_date import known

@@ -5,7 +5,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
-from ..live import refresh
+from ..live.view import refresh
 from ..scene.character import armature as armature_reader
 from ..scene.character.binding import carrier
 from ..scene.character.body import find, left_behind

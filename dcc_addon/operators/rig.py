@@ -10,10 +10,10 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
 from ..bake_files import output_path, owner_of, shot_beside
-from ..blowing import blowing, in_core
-from ..live import refresh
-from ..live_rig import bind, rest, show_rest
-from ..models import model_path
+from ..live.blowing import blowing, in_core
+from ..live.live_rig import bind, rest, show_rest
+from ..live.models import model_path
+from ..live.view import refresh
 from ..scene.baked import as_keyed
 from ..scene.drawing.clock import stretch_of
 from ..scene.export import write_shot

@@ -4,8 +4,8 @@
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..live import refresh
-from ..live_strands import show_rest
+from ..live.live_strands import show_rest
+from ..live.view import refresh
 from ..scene import particles
 from ..scene.character.binding import carrier
 from ..scene.files.paths import check_own

@@ -13,8 +13,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models.model_file import SUFFIX
 from neuralocks_core.training.work import abandon, reserve
 
-from ..live import refresh
-from ..models import SETTING
+from ..live.models import SETTING
+from ..live.view import refresh
 from ..scene.drawing.redraw import redraw
 from ..scene.export import write_shot
 from ..scene.files.paths import check_own, library_of

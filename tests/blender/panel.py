@@ -21,7 +21,7 @@ NOISE = "no icon for icon ID"
 
 def drawn(icon: str = "") -> list[str]:
     """Everything that the panels and the menu say now; only text beside this icon, if one is given."""
-    from dcc_addon import menu, panels
+    from dcc_addon.interface import menu, panels
     from dcc_addon.operators.training import known_problem
 
     def draw(layout):

@@ -167,8 +167,9 @@ def told_of_what_is_there(_folder: Path) -> None:
 def words(_folder: Path) -> None:
     """Every operator is found by Blender's search, and everything has a name and a tooltip."""
     import dcc_addon
-    from dcc_addon import operators, properties
-    from dcc_addon.preferences import Preferences
+    from dcc_addon import operators
+    from dcc_addon.interface import properties
+    from dcc_addon.interface.preferences import Preferences
 
     assert dcc_addon.bl_info["name"] == "Neuralocks"
     for cls in operators.CLASSES:
@@ -195,7 +196,7 @@ def words(_folder: Path) -> None:
 def remedy_in_full(_folder: Path) -> None:
     """The preferences break what training lacks into lines: one label would be cut off before the command to run."""
     said = " ".join(["Training needs a Python with torch"] * 6)
-    with patch("dcc_addon.preferences.known_problem", return_value=said):
+    with patch("dcc_addon.interface.preferences.known_problem", return_value=said):
         *lines, button = preferences()
     assert " ".join(lines) == said and max(map(len, lines)) <= 40, lines
     assert button == "Copy Install Command"

@@ -166,8 +166,8 @@ def weighted_elsewhere(_folder: Path) -> None:
     """A chosen body that no bone of the character moves gets a note, with the rig that moves it; one that moves with bones of the
     same names, or rides on one, does not.
     """
+    from dcc_addon.interface.panels import findings
     from dcc_addon.operators.character import NEURALOCKS_OT_check
-    from dcc_addon.panels import findings
 
     control = scenes.armature("Control", [(f"c_{n}", p and f"c_{p}", *ends) for n, p, *ends in scenes.BONES])
     game, twin, said = scenes.armature("Game"), scenes.armature("Twin"), []

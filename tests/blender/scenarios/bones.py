@@ -111,8 +111,8 @@ def bones_without_their_mesh(folder: Path) -> None:
 
 def renamed_bones(folder: Path) -> None:
     """A renamed bone is noticed like an added one; it is turned as it was before it was live."""
-    from dcc_addon import live
-    from dcc_addon.panels import findings
+    from dcc_addon.interface.panels import findings
+    from dcc_addon.live import view
 
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
@@ -123,10 +123,10 @@ def renamed_bones(folder: Path) -> None:
     rig.neuralocks_character.rig_live = True
     scene.frame_set(5)
     assert bone.rotation_mode == "QUATERNION"
-    assert not messages() and not live.needs_sampling(scene)
+    assert not messages() and not view.needs_sampling(scene)
     assert findings(rig)[0][0] == "Head: head"
     rig.data.bones["hair.01"].name, rig.data.bones["head"].name = "hair.root", "Head"
-    assert live.needs_sampling(scene) == [rig] and findings(rig)[0][0] == "Head: Head"
+    assert view.needs_sampling(scene) == [rig] and findings(rig)[0][0] == "Head: Head"
     scene.frame_set(6)
     assert "bones have changed" in messages()["Rig"], messages()
     bone = rig.pose.bones["hair.root"]

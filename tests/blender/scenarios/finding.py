@@ -87,7 +87,7 @@ def head_of_a_control_rig(_folder: Path) -> None:
 
 def examined_again(_folder: Path) -> None:
     """The panel tells of the rig as it is, also after its skin was bound and after a bone got another parent."""
-    from dcc_addon.panels import findings
+    from dcc_addon.interface.panels import findings
 
     rig = scenes.armature(bones=(*scenes.BONES, ("copy", "chest", (0, 0, 1.55), (0, 0, 1.75))))
     rig.data.bones["head"].use_deform = False

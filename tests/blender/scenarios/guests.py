@@ -58,12 +58,13 @@ def drawn_by_another_scene(folder: Path) -> None:
                 assert same(_seen(bpy.data.objects["Hair"], graph_of(other, other.view_layers[0])), frame), way
 
 
-@patch("dcc_addon.live_strands.at_once", lambda graph: False)
+@patch("dcc_addon.live.live_strands.at_once", lambda graph: False)
 def shown_before_its_own_scene(folder: Path) -> None:
     """If a file opens in the scene that draws the hair, the hair is sampled in a scene that Blender has never shown, prepared in
     the background, and then is as in its own scene; also at the first frame, if the file was saved at another.
     """
-    from dcc_addon import background, preparing
+    from dcc_addon import background
+    from dcc_addon.live import preparing
     from dcc_addon.scene.character.layers import graph_of
     from dcc_addon.session import session
 
@@ -115,7 +116,7 @@ def named_as_another(folder: Path) -> None:
     """A set from a library moves beside objects of the same names; and no scene's objects are scanned twice per frame, because
     there may be ten thousand.
     """
-    from dcc_addon import live
+    from dcc_addon.live import view
     from dcc_addon.scene.drawing import guests
     from dcc_addon.scene.objects import lively
 
@@ -131,8 +132,8 @@ def named_as_another(folder: Path) -> None:
     for drawn, passes in ((None, 1), (behind, 2)):
         scene.background_set = drawn
         graph = bpy.context.evaluated_depsgraph_get()
-        with patch.object(live, "lively", wraps=lively.lively) as looks, patch.object(guests, "lively", looks):
-            live.update(scene, graph)
+        with patch.object(view, "lively", wraps=lively.lively) as looks, patch.object(guests, "lively", looks):
+            view.update(scene, graph)
             assert looks.call_count == passes
     assert [(thing.name, home) for thing, home in guests.guests(scene)] == [("Hair", behind)]
 

@@ -73,7 +73,7 @@ def strands_on_a_hair_bone(folder: Path) -> None:
     """Strands whose object moves with a hair bone, or with a child of one, are refused by Live and by caches while that bone is live or
     its keys play, and a bake has a note: Blender would move them with the bone, and a bake does not.
     """
-    from dcc_addon.hair_notes import hair_notes
+    from dcc_addon.interface.hair_notes import hair_notes
 
     needs_usd()
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)

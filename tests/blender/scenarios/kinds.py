@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from dcc_addon.hair_notes import unnamed_model
+from dcc_addon.interface.hair_notes import unnamed_model
 from tests.blender.checks import SAME, apart, baked_points, make_live, points_at
 
 

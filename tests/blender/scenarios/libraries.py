@@ -150,7 +150,7 @@ def beside_the_file(folder: Path) -> None:
     """A model named with // is beside the file in which it was named: the library of linked and overridden hair, and where
     this file was before it was saved in another folder; a copy there changes nothing here.
     """
-    from dcc_addon.models import model_path
+    from dcc_addon.live.models import model_path
 
     library, shots = folder / "library", folder / "shots"
     library.mkdir()
@@ -219,7 +219,7 @@ def appended(folder: Path) -> None:
     """Appended hair finds the model beside its own file, if Blender reports that file; hair that is made local says where the model
     was looked for, and where it is.
     """
-    from dcc_addon.models import model_path
+    from dcc_addon.live.models import model_path
 
     library, shots = folder / "library", folder / "shots"
     library.mkdir()

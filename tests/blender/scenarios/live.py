@@ -15,7 +15,7 @@ from tests.blender.panel import drawn
 
 def sampled_first(_folder: Path) -> None:
     """In a window, the first Live says to wait, without an error: the motion is sampled automatically, unless that failed."""
-    from dcc_addon import live
+    from dcc_addon.live import view
     from dcc_addon.session import session
 
     def said(icon: str) -> bool:
@@ -24,12 +24,12 @@ def sampled_first(_folder: Path) -> None:
     rig, strands = scenes.dancer(10)
     scene = bpy.context.scene
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
-    with patch("dcc_addon.unsampled.bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
+    with patch("dcc_addon.live.unsampled.bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
         strands.neuralocks_hair.live = True
         assert session.wanting and "sampled as soon as playback stops" in messages()["Hair"], messages()
         assert said("TIME") and not said("ERROR")
         session.failed.add("Rig")
-        live.refresh(scene)
+        view.refresh(scene)
         assert "press Sample Motion" in messages()["Hair"], messages()
         assert said("ERROR") and not said("TIME")
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import bpy
 
-from dcc_addon.hair_notes import hair_notes
-from dcc_addon.model_updates import NOTE
+from dcc_addon.interface.hair_notes import hair_notes
+from dcc_addon.live.model_updates import NOTE
 from tests.blender import scenes
 from tests.blender.checks import MODEL, make_live
 

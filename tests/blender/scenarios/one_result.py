@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from dcc_addon.hair_notes import unnamed_model
+from dcc_addon.interface.hair_notes import unnamed_model
 from tests.blender import scenes
 from tests.blender.checks import (
     MODEL,
@@ -116,7 +116,7 @@ def put_elsewhere(folder: Path) -> None:
 
 def other_frames(folder: Path) -> None:
     """A bake of more frames than the scene has, or fewer, is what is shown live: both remember the same past."""
-    from dcc_addon import live
+    from dcc_addon.live import view
     from dcc_addon.session import session
 
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
@@ -128,7 +128,7 @@ def other_frames(folder: Path) -> None:
     clamped = points_at(strands, 18)
     settings = scene.neuralocks
     settings.use_scene_range, settings.frame_start, settings.frame_end = False, 1, 24
-    assert live.needs_sampling(scene) == [rig], "what is to be baked has changed"
+    assert view.needs_sampling(scene) == [rig], "what is to be baked has changed"
     assert bpy.ops.neuralocks.bake(filepath=str(folder / "more.usdc")) == {"FINISHED"}
     shown = {f: points_at(strands, f) for f in (24, 5, 18)}
     assert not session.rigs["Rig"].stale and apart(shown[18], clamped) > 1e-3

@@ -81,7 +81,7 @@ def _pasted() -> list[Path]:
 
 
 def _models(things) -> list[Path]:
-    from dcc_addon.models import model_path
+    from dcc_addon.live.models import model_path
 
     kinds = {"CURVES": "strands", "ARMATURE": "rig"}
     return [Path(model_path(thing, kinds[thing.type])).resolve() for thing in things]

@@ -81,15 +81,15 @@ def prepared_beside(_folder: Path) -> None:
     strands.neuralocks_hair.live = False
     groomed = points_at(strands, 9)
     with (
-        patch("dcc_addon.live_strands.at_once", lambda graph: graph.mode == "RENDER"),
-        patch("dcc_addon.properties.by_script", lambda context: False),
+        patch("dcc_addon.live.live_strands.at_once", lambda graph: graph.mode == "RENDER"),
+        patch("dcc_addon.interface.properties.by_script", lambda context: False),
     ):
         _in_a_window(strands, shown, groomed)
 
 
 def _in_a_window(strands, shown, groomed) -> None:
     """Live hair is switched on and off while it is prepared."""
-    from dcc_addon import live, preparing
+    from dcc_addon.live import preparing, view
     from dcc_addon.session import session
 
     own = strands.neuralocks_hair
@@ -119,7 +119,7 @@ def _in_a_window(strands, shown, groomed) -> None:
     assert "no such" in messages()["Hair"], messages()
     own.model = MODEL
     assert session.preparing
-    live.refresh(bpy.context.scene, wait=True)
+    view.refresh(bpy.context.scene, wait=True)
     assert not session.preparing and apart(points_at(strands, 9), shown) == 0.0
 
     own.live = False
@@ -134,7 +134,7 @@ def _in_a_window(strands, shown, groomed) -> None:
 
 def prepared_together(_folder: Path) -> None:
     """Showing one hair may stop the preparation of others, or fail: the rest arrives all the same."""
-    import dcc_addon.preparing as preparing
+    from dcc_addon.live import preparing
     from dcc_addon.session import session
 
     arrived = []

@@ -14,7 +14,7 @@ TEXT = "The head is 18 m wide; check the scene's Unit Scale or the armature's sc
 
 def texts_fit_the_sidebar(_folder: Path) -> None:
     """In this Blender's font: a wider sidebar needs fewer lines, and an almost closed one does not get a line per letter."""
-    from dcc_addon import labels
+    from dcc_addon.interface import labels
 
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0), ui_styles=bpy.context.preferences.ui_styles)
     counts = []

@@ -21,7 +21,7 @@ def training(folder: Path) -> None:
     """Train in another process: the model goes to the hair that it was trained for, and is named relative to this file; a second
     training at the same time is refused, and no exported character stays behind.
     """
-    from dcc_addon.models import model_path
+    from dcc_addon.live.models import model_path
 
     strands = _in_training(folder)
     exported = Path(tempfile.tempdir)
@@ -146,7 +146,7 @@ def saved_in_training(folder: Path) -> None:
     """The file may be saved under another name meanwhile, and the hair renamed: the model goes to the hair there, also if that file
     is reopened.
     """
-    from dcc_addon.models import model_path
+    from dcc_addon.live.models import model_path
     from dcc_addon.operators import training as operator
 
     strands, other = _in_training(folder), folder / "other"
@@ -166,7 +166,7 @@ def saved_in_training(folder: Path) -> None:
 
 def trained_in_a_shot(folder: Path) -> None:
     """The model of overridden hair is found, even if the hair's own file names one by the same relative path."""
-    from dcc_addon.models import model_path
+    from dcc_addon.live.models import model_path
     from dcc_addon.operators import training as operator
 
     library, out = folder / "library", folder / "Hair_1.neuralocks"

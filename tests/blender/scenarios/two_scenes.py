@@ -40,10 +40,10 @@ def two_windows(_folder: Path) -> None:
     assert second.frame_current == 9 and apart(curves.shown(hair.data), curves.points(hair.data)) > 1e-3
 
 
-@patch("dcc_addon.live_strands.at_once", lambda graph: False)
+@patch("dcc_addon.live.live_strands.at_once", lambda graph: False)
 def arrived_elsewhere(_folder: Path) -> None:
     """Hair is prepared while another scene comes into view: it moves when its own scene is shown again, without errors."""
-    from dcc_addon import preparing
+    from dcc_addon.live import preparing
     from dcc_addon.scene.hair import curves
     from dcc_addon.session import session
 

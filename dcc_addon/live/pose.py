@@ -5,14 +5,14 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from .scene.character.binding import hidden
-from .scene.drawing.clock import shown_frame
-from .scene.drawing.last_called import others_called
-from .scene.keys.hair_keys import as_before
-from .scene.motion.sampled_from import timing_of
-from .services.axes import to_core
-from .services.motion import as_carried, same_pose
-from .session import session
+from ..scene.character.binding import hidden
+from ..scene.drawing.clock import shown_frame
+from ..scene.drawing.last_called import others_called
+from ..scene.keys.hair_keys import as_before
+from ..scene.motion.sampled_from import timing_of
+from ..services.axes import to_core
+from ..services.motion import as_carried, same_pose
+from ..session import session
 
 
 def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np.ndarray:

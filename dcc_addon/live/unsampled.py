@@ -5,7 +5,7 @@ import bpy
 
 from neuralocks_core.errors import NeuralocksError
 
-from .session import session
+from ..session import session
 
 FIRST = "its motion is sampled as soon as playback stops; then the hair moves"
 """What an artist has to wait for, without doing anything."""

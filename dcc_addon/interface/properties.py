@@ -8,12 +8,13 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty,
 
 from neuralocks_core.wind import STRONGEST
 
-from . import background, live
-from .models import SETTING as MODELS
-from .scene.files import named_from
-from .scene.files.paths import FILE
-from .services.sliders import SLIDERS
-from .session import session
+from .. import background
+from ..live import view
+from ..live.models import SETTING as MODELS
+from ..scene.files import named_from
+from ..scene.files.paths import FILE
+from ..services.sliders import SLIDERS
+from ..session import session
 
 OVERRIDABLE = {"override": {"LIBRARY_OVERRIDABLE"}}
 """A choice made for a library override is saved with it."""
@@ -41,7 +42,7 @@ def by_script(context) -> bool:
 
 
 def _live_changed(hair_settings, context) -> None:
-    live.strands_toggled(hair_settings.id_data, context, wait=by_script(context))
+    view.strands_toggled(hair_settings.id_data, context, wait=by_script(context))
     background.request()
 
 
@@ -51,22 +52,22 @@ def _carrier_changed(hair_settings, context) -> None:
 
 
 def _look_changed(hair_settings, context) -> None:
-    live.refresh(context.scene, wait=by_script(context))
+    view.refresh(context.scene, wait=by_script(context))
 
 
 def _rig_live_changed(character, context) -> None:
-    live.rig_toggled(character.id_data, context)
+    view.rig_toggled(character.id_data, context)
     background.request()
 
 
 def _rig_look_changed(character, context) -> None:
-    live.refresh(context.scene)
+    view.refresh(context.scene)
 
 
 def _rig_model_changed(character, context) -> None:
     named_from.remember([character.id_data], MODELS.values())
     session.chains.pop(character.id_data.name_full, None)
-    live.refresh(context.scene)
+    view.refresh(context.scene)
 
 
 def _model_changed(settings, context) -> None:
@@ -80,16 +81,16 @@ def _character_changed(settings, context) -> None:
 
 
 def _range_changed(_settings, context) -> None:
-    live.refresh(context.scene)
+    view.refresh(context.scene)
     background.request()
 
 
 def _wind_changed(_character, context) -> None:
-    live.refresh(context.scene, wait=by_script(context))
+    view.refresh(context.scene, wait=by_script(context))
 
 
 def _loop_changed(character, context) -> None:
-    live.loop_changed(character.id_data, context.scene)
+    view.loop_changed(character.id_data, context.scene)
 
 
 class HairSettings(bpy.types.PropertyGroup):

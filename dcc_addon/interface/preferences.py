@@ -4,14 +4,14 @@
 import bpy
 from bpy.props import StringProperty
 
+from ..operators.training import known_problem
 from .labels import words
-from .operators.training import known_problem
 
 
 class Preferences(bpy.types.AddonPreferences):
     """Where training runs: torch is too large to ship, and is not needed for anything else."""
 
-    bl_idname = __package__
+    bl_idname = __package__.rsplit(".", 1)[0]
 
     python: StringProperty(
         name="Python for Training",

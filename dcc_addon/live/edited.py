@@ -11,11 +11,11 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, transformed
 
-from .kept import Followed, Written
-from .scene.character.armature import matrix
-from .scene.hair import curves
-from .scene.objects.lookup import identity
-from .session import session
+from ..kept import Followed, Written
+from ..scene.character.armature import matrix
+from ..scene.hair import curves
+from ..scene.objects.lookup import identity
+from ..session import session
 
 ROUNDING = 1e-5
 """Points that differ by less than this, relative to the largest coordinate, are the same."""

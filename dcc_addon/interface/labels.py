@@ -4,10 +4,10 @@
 import blf
 import bpy
 
-from .services.panel_errors import for_the_panel
-from .services.wrapping import wrapped
-from .session import session
-from .unsampled import FIRST
+from ..live.unsampled import FIRST
+from ..services.panel_errors import for_the_panel
+from ..services.wrapping import wrapped
+from ..session import session
 
 MARGINS, ICON = 70, 25
 """Width of the sidebar's tabs with the margins of a panel and of a box in it, and of an icon with its space, at scale 1."""

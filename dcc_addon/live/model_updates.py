@@ -10,7 +10,7 @@ import bpy
 
 from neuralocks_core.models import model_file
 
-from .session import session
+from ..session import session
 
 NOTE = (
     "The models that come with the add-on are others than when this file was saved, so this hair may move differently"

@@ -4,15 +4,15 @@
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
+from ..kept import Bound
+from ..scene.drawing.clock import shown_frame
+from ..scene.keys import rotations
+from ..scene.objects.lively import lively
+from ..services.bones import LiveBones
+from ..session import session
 from .blowing import in_core
-from .kept import Bound
 from .models import model_path, stamp
 from .pose import pose
-from .scene.drawing.clock import shown_frame
-from .scene.keys import rotations
-from .scene.objects.lively import lively
-from .services.bones import LiveBones
-from .session import session
 from .unsampled import unsampled
 
 

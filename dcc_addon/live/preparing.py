@@ -3,9 +3,9 @@
 
 import bpy
 
-from .scene.drawing.redraw import redraw
-from .services.threaded import Threaded
-from .session import session
+from ..scene.drawing.redraw import redraw
+from ..services.threaded import Threaded
+from ..session import session
 
 LOOK = 0.05
 """Time between two looks at what is being prepared [s]."""

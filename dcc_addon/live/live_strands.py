@@ -12,28 +12,28 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.rotation import inverse
 
+from ..kept import Prepared
+from ..scene.character.layers import graph_of, layer_of
+from ..scene.character.placing import world
+from ..scene.character.riding import on_hair_bone
+from ..scene.drawing.clock import shown_frame
+from ..scene.drawing.watched import evaluated_for_itself
+from ..scene.drawing.windows import drawing, layer_shown
+from ..scene.files.paths import check_found
+from ..scene.hair import curves
+from ..scene.hair.muting import mute_deformers, unmute_deformers
+from ..scene.objects.lively import lively
+from ..scene.objects.lookup import find, identity, in_scene
+from ..services import rig as rig_service
+from ..services.axes import to_core
+from ..services.live import LiveHair
+from ..services.motion import TOLERANCE
+from ..services.sliders import MATERIAL, MOTION
+from ..session import session
 from . import edited, joined, preparing
 from .blowing import in_core
-from .kept import Prepared
 from .models import load_model, model_path, named_model, stamp
 from .pose import pose
-from .scene.character.layers import graph_of, layer_of
-from .scene.character.placing import world
-from .scene.character.riding import on_hair_bone
-from .scene.drawing.clock import shown_frame
-from .scene.drawing.watched import evaluated_for_itself
-from .scene.drawing.windows import drawing, layer_shown
-from .scene.files.paths import check_found
-from .scene.hair import curves
-from .scene.hair.muting import mute_deformers, unmute_deformers
-from .scene.objects.lively import lively
-from .scene.objects.lookup import find, identity, in_scene
-from .services import rig as rig_service
-from .services.axes import to_core
-from .services.live import LiveHair
-from .services.motion import TOLERANCE
-from .services.sliders import MATERIAL, MOTION
-from .session import session
 from .unsampled import unsampled
 
 EDITING = {"EDIT", "EDIT_CURVES", "SCULPT_CURVES"}
@@ -46,7 +46,7 @@ def live_hairs(scene) -> list:
 
 def update(hair, scene, graph, moved: bool, wait: bool, home=None) -> None:
     """Write the points of a hair object for the pose that `graph` has evaluated; rest hair, with a message that says why, if that
-    is not possible, and rest hair while it is being prepared. The arguments are those of `live.update`; `home` is the scene that
+    is not possible, and rest hair while it is being prepared. The arguments are those of `view.update`; `home` is the scene that
     the hair is in, if that is another one.
     """
     try:

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import operators
+from .. import operators
 
 PLACES = ("VIEW3D_MT_object", "VIEW3D_MT_pose", "VIEW3D_MT_edit_curves", "VIEW3D_MT_sculpt_curves")
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import bpy
 
+from ..scene.character.layers import elsewhere, graph_of, layer_of
+from ..scene.drawing.guests import guests
+from ..scene.drawing.locked import lock
+from ..scene.motion.sampled_from import key_of
+from ..scene.objects.lively import lively
+from ..scene.objects.lookup import find, in_scene
+from ..session import session
 from . import live_rig, live_strands
-from .scene.character.layers import elsewhere, graph_of, layer_of
-from .scene.drawing.guests import guests
-from .scene.drawing.locked import lock
-from .scene.motion.sampled_from import key_of
-from .scene.objects.lively import lively
-from .scene.objects.lookup import find, in_scene
-from .session import session
 
 
 def strands_toggled(hair, context, wait: bool) -> None:

@@ -3,7 +3,7 @@
 
 from neuralocks_core.wind import Wind
 
-from .services.wind import Blowing
+from ..services.wind import Blowing
 
 
 def blowing(armature) -> Blowing:

@@ -3,14 +3,14 @@
 
 from neuralocks_core.models.model_file import kind_known
 
-from .model_updates import NOTE
-from .scene.baked import as_groomed
-from .scene.baked.attach import has_cache
-from .scene.character.riding import on_hair_bone
-from .scene.hair import cached_strands, imported
-from .scene.hair.muting import off_meanwhile
-from .scene.objects import recorded
-from .session import session
+from ..live.model_updates import NOTE
+from ..scene.baked import as_groomed
+from ..scene.baked.attach import has_cache
+from ..scene.character.riding import on_hair_bone
+from ..scene.hair import cached_strands, imported
+from ..scene.hair.muting import off_meanwhile
+from ..scene.objects import recorded
+from ..session import session
 
 
 def hair_notes(hair, scene) -> list[str]:

@@ -7,19 +7,19 @@ from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP
 
+from ..operators.training import job, known_problem, notes
+from ..scene.baked import as_keyed, attach
+from ..scene.files.paths import usual_output
+from ..scene.hair import imported
+from ..scene.keys import hair_keys
+from ..scene.motion.sampled_from import begins_later, frames_of
+from ..scene.particles import waiting
+from ..services.panel_errors import for_the_panel
+from ..services.remaining import in_words
+from ..services.sliders import SLIDERS
+from ..session import session
 from .hair_notes import hair_notes, unnamed_model
 from .labels import hint, message, progress, words
-from .operators.training import job, known_problem, notes
-from .scene.baked import as_keyed, attach
-from .scene.files.paths import usual_output
-from .scene.hair import imported
-from .scene.keys import hair_keys
-from .scene.motion.sampled_from import begins_later, frames_of
-from .scene.particles import waiting
-from .services.panel_errors import for_the_panel
-from .services.remaining import in_words
-from .services.sliders import SLIDERS
-from .session import session
 
 LATER = (
     "it knows no motion before it. To render a part of a shot again, turn off Scene Range in the panel Bake, and name the "
@@ -275,9 +275,9 @@ def findings(armature) -> tuple[list[str], str]:
     """What is found in the rig, and what is wrong with it or with the chosen body; the rig is examined again only when it may
     be found otherwise.
     """
-    from .scene.character import armature as armature_reader
-    from .scene.character.body import left_behind
-    from .services import rig as rig_service
+    from ..scene.character import armature as armature_reader
+    from ..scene.character.body import left_behind
+    from ..services import rig as rig_service
 
     chosen = armature.neuralocks_character.head_bone
     key = armature.name_full, *armature_reader.found_by(armature)

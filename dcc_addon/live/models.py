@@ -9,8 +9,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models import model_file
 from neuralocks_core.models.runtime import StrandModel
 
-from .scene.files.paths import absolute, library_of
-from .session import session
+from ..scene.files.paths import absolute, library_of
+from ..session import session
 
 SETTING = {"strands": "neuralocks_hair.model", "rig": "neuralocks_character.rig_model"}
 """Where an object names its model, by its kind."""
