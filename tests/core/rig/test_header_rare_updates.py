@@ -89,6 +89,16 @@ def test_updates_may_be_rare_and_then_be_frames(tmp_path, every, updates):
     assert_that_means_are_those_of_the_same_integrals(history_of(tmp_path), t, range(2, len(t)))
 
 
+def test_a_turn_by_any_angle_between_two_updates_is_felt_as_that_angle(tmp_path):
+    """Up to half a turn, where the header's series for the arctangent is at its end, to either side."""
+    angles = np.radians(np.random.default_rng(0).permutation(np.linspace(-178, 178, 90)))
+    t, yaw = 0.375 * np.arange(91), np.r_[0, np.cumsum(angles)]
+    turned = read(history_of(tmp_path), head_rows(t, yaw=yaw))
+    steps = SPEC.dt * np.r_[0, np.cumsum(SPEC.bins)]
+    for last in range(8, 91):
+        np.testing.assert_allclose(turned[last, :, 4], means(np.interp(t[last] - steps, t, yaw)), atol=3e-5)
+
+
 @pytest.mark.parametrize("spin", [24, 90])
 @pytest.mark.parametrize("bins", [(1, 1, 44), (40, 400)], ids=str)
 def test_a_spin_in_a_long_bin_is_felt_as_it_is(tmp_path, spin, bins):
