@@ -49,6 +49,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
             "--groom, --skeleton, --head, --joint: choose within a shot; give it with --shot, or leave them out"
         )
     before = _told(folder / DESCRIPTION)
+    ours = set() if before is None else _written(before) | {DESCRIPTION}
     read, mover = [], None
     if shot is not None:
         read, mover = _grooms(shot, model, grooms, skeleton, head, joints)
@@ -58,7 +59,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
     with ExitStack() as all_or_none:
 
         def put(name: str) -> Path:
-            if before is None and (folder / name).is_file():
+            if name not in ours and (folder / name).is_file():
                 raise NeuralocksError(f"{folder / name}: belongs to something else; move it, or choose another folder")
             return all_or_none.enter_context(atomic_write(folder / name))
 
@@ -72,7 +73,7 @@ def export_model(model, folder, shot=None, *, grooms=None, skeleton=None, head=N
             put(name).write_bytes(data)
         check()
     # Beside graphs of another model, data of an earlier export would give wrong hair without a word.
-    for name in _written(before or {}) - {*files, *tables}:
+    for name in ours - {*files, *tables}:
         if os.path.isfile(folder / name):  # also False for a name that no disk can hold
             (folder / name).unlink()
     return [folder / name for name in (*files, *tables)]

@@ -84,6 +84,21 @@ def test_a_graph_of_something_else_is_not_written_over(tmp_path, capsys):
         assert status("export", "-o", tmp_path) == 0
 
 
+def test_nor_is_what_lies_beside_an_earlier_export(tmp_path, model, capsys):
+    """Only what its description tells of is its own."""
+    shot = write_shot(tmp_path)
+    out, mine = tmp_path / "out", tmp_path / "out/Hero_Hair.npz"
+    assert status("export", model, "-o", out) == 0
+    mine.write_text("mine")
+    before = {path: path.read_bytes() for path in out.iterdir()}
+    assert status("export", model, "-o", out, "--shot", shot) == 1
+    assert "Hero_Hair.npz: belongs to something else; move it" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in out.iterdir()} == before
+    mine.unlink()
+    for _ in range(2):
+        assert status("export", model, "-o", out, "--shot", shot) == 0
+
+
 def test_a_description_of_something_else_is_not_written_over(tmp_path, capsys):
     for text in ('{"units": 1}', "notes"):
         (tmp_path / "description.json").write_text(text)
