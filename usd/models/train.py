@@ -165,17 +165,24 @@ def _value(name: str, word: str, default):
         if isinstance(default, enum.Enum):
             return {member.name.lower(): member for member in type(default)}[word.lower()]
         if isinstance(default, tuple):
-            return tuple(plain_number(part) for part in word.split(","))
+            return tuple(map(_finite, word.split(",")))
         if default is None or isinstance(default, int):
             return plain_number(word, int)
         if isinstance(default, float):
-            number = plain_number(word)
-            if not math.isfinite(number):
-                raise ValueError
-            return number
+            return _finite(word)
     except (KeyError, ValueError):
         wanted = "a whole number" if default is None else f"like {default}"
+        if isinstance(default, tuple):
+            wanted = f"numbers with commas between them, like {','.join(map(str, default))},1.0"
         if isinstance(default, enum.Enum):
             wanted = "|".join(m.name.lower() for m in type(default))
         raise NeuralocksError(f"--set {name}={word}: is not a value for it; give {wanted}") from None
     return word
+
+
+def _finite(word: str) -> float:
+    """The number that a word states; ValueError if it is none, or not finite."""
+    number = plain_number(word)
+    if not math.isfinite(number):
+        raise ValueError
+    return number
