@@ -82,12 +82,10 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a tiny network for the hair joints of one rig (extra 'train'). No data is needed."""
-    from neuralocks_core.models import model_file
     from neuralocks_core.rig.report_text import report_lines
 
     from ..rig.train import train_rig
 
-    model_file.named(out)
     changed = {"bend": bend, "weight": weight, "damping": damping}
     with progress_bar("training") as progress:
         model = train_rig(

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 
+from neuralocks_core.models import model_file
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.arguments import flag
 from neuralocks_core.character import Character
@@ -68,7 +69,7 @@ def train_rig(
     check_training()
     from neuralocks_core.rig.rods import RigMaterial
 
-    character, out = as_path(character, "character"), as_path(out, "out")
+    character, out = as_path(character, "character"), model_file.named(as_path(out, "out"))
     check_writable(out)
     former = None if begin is None else Beginning(begin, dynamic, hidden)
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=joints, all_shapes=True)

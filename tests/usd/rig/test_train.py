@@ -61,6 +61,16 @@ def test_numbers_that_no_training_can_use_are_refused(tmp_path, given, said):
     assert said in str(caught.value)
 
 
+def test_a_name_that_no_model_can_have_is_refused_before_training(tmp_path):
+    """Not when what was learned in minutes is written."""
+    pytest.importorskip("torch")
+    shot = small_shot(tmp_path / "who.usda")
+    before = shot.read_bytes()
+    with pytest.raises(NeuralocksError, match="who.usda: a model file ends in .neuralocks; choose such a name"):
+        train_rig(shot, shot, dynamic=False, steps=1, progress=lambda *_: pytest.fail("it is trained"))
+    assert shot.read_bytes() == before
+
+
 def test_a_model_that_cannot_be_trained_on_is_refused(tmp_path):
     """Before the rig is read, or before anything is simulated."""
     pytest.importorskip("torch")
