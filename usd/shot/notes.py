@@ -265,7 +265,7 @@ def partial_body(rig: StageRig, left: Sequence[str]) -> list[str]:
     if not left:
         return []
     return [
-        f"{rig.path}: {', '.join(left[:3])} {'is' if len(left) == 1 else 'are'} the same character, but no joint there moves like one "
+        f"{rig.path}: {', '.join(few([*left], 'skeletons'))} {'is' if len(left) == 1 else 'are'} the same character, but no joint there moves like one "
         "of the same name here, so hair is not kept out of those meshes; bind all to one skeleton if hair touches them"
     ]
 

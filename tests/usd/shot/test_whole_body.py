@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hair is kept out of all meshes of a character in several skeletons, as if one skinned them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from usd.baking.bake import bake
 from usd.review.inspect import inspect
+from usd.shot.notes import partial_body
 from usd.shot.stage import read_shot
 
 from ..shots import HAIR, Recipe, world_points, write_shot
@@ -93,3 +96,9 @@ def test_meshes_on_joints_of_other_names_are_told(tmp_path):
     assert any(note.startswith(told) for note in read_shot(path).notes)
     assert any(note.startswith(told) for note in inspect(path)["spoils"])
     assert not any("no body" in note for note in read_shot(path).notes)
+
+
+def test_of_many_skeletons_of_a_character_it_is_told_how_many_there_are():
+    for count, who in ((4, "/Part3 are"), (9, "6 more skeletons are")):
+        (note,) = partial_body(SimpleNamespace(path="/Hero"), [f"/Part{number}" for number in range(count)])
+        assert note.startswith(f"/Hero: /Part0, /Part1, /Part2, {who} the same character"), note
