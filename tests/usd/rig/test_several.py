@@ -2,6 +2,8 @@
 """Several characters with hair on joints, in one shot or as rows of one batch."""
 
 import re
+import signal
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +12,9 @@ from pxr import Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.network import RigSampler
+from usd.border.stopping import stoppable
 from usd.rig.bake import bake_rig
-from usd.rig.stage import BAKED, read_rigged_hair
+from usd.rig.stage import BAKED, read_rigged_hair, read_rigged_hairs
 from usd.shot.lacking import has_hair_joints
 
 from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
@@ -75,6 +78,25 @@ def test_where_no_character_can_move_the_first_says_why(crowd, tmp_path):
     stage.Save()
     with pytest.raises(NeuralocksError, match="/Still/Rig: its head joint 'head' is not animated"):
         bake_rig(shot, tmp_path / "out.usda", model)
+    assert not (tmp_path / "out.usda").exists()
+
+
+@pytest.mark.parametrize("work", ["stage.check_authored", "bake.BoundHair.of", "bake.MovedHair"])
+def test_who_stops_at_one_character_does_not_go_on_with_the_others(crowd, tmp_path, monkeypatch, work):
+    """USD swallows Ctrl-C, and what it then says passes for something wrong with that character."""
+
+    def swallowed(*_):
+        monkeypatch.undo()
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise NeuralocksError("it, or a file it uses, is damaged")
+
+    monkeypatch.setattr(f"usd.rig.{work}", swallowed)
+    with pytest.raises(SystemExit), stoppable():
+        if work.startswith("stage"):
+            read_rigged_hairs(crowd[0])
+        else:
+            bake_rig(crowd[0], tmp_path / "out.usda", crowd[1])
     assert not (tmp_path / "out.usda").exists()
 
 
