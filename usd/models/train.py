@@ -171,7 +171,7 @@ def _value(name: str, word: str, default):
         if isinstance(default, float):
             return _finite(word)
     except (KeyError, ValueError):
-        wanted = "a whole number" if default is None else f"like {default}"
+        wanted = "a whole number" if default is None else f"something like {default}"
         if isinstance(default, tuple):
             wanted = f"numbers with commas between them, like {','.join(map(str, default))},1.0"
         if isinstance(default, enum.Enum):

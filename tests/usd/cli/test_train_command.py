@@ -50,6 +50,7 @@ def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_p
         (("--set", "minutes=-5"), "--minutes"),
         (("--set", "rate=-1"), "rate"),
         (("--set", "clips=0"), "clips"),
+        (("--set", "clips=many"), "--set clips=many: is not a value for it; give something like 48"),
         (("--set", "clips=10000000"), "clips=10000000: must be at most 10,000"),
         ((*selfsupervised, "--set", "poses=100000000"), "poses=100000000: must be at most 10,000"),
         (("--set", "mirror=5"), "mirror=5"),

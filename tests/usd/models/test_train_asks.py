@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from neuralocks_core import model
+from neuralocks_core.boundary_spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
@@ -15,7 +16,7 @@ from neuralocks_core.training.regression_options import RegressionOptions
 from neuralocks_core.training.selfsupervised import paper_boundary
 from neuralocks_core.training.work import BEGINNING, folder_beside
 from tests.strand_models import write_random_model
-from usd.models.train import train
+from usd.models.train import begins_with, parsed, train
 
 
 @pytest.fixture
@@ -75,3 +76,21 @@ def test_a_training_that_began_with_a_model_does_not_go_on_with_nothing(tmp_path
     with pytest.raises(NeuralocksError, match=r"--begin nothing: the training in \S+ began with a model; resume with"):
         train("who.usda", ["bob"], [], out, {}, begin="nothing", resume=True)
     assert made.scene is None
+
+
+def test_unless_it_is_asked_for_no_training_begins_with_a_model_of_another_method(made):
+    """Even if all else is the same."""
+    same = {name: getattr(RegressionOptions(), name) for name in ("output", "motion", "strand_map")}
+    options = SelfSupervisedOptions(**same)
+    assert begins_with("shipped", False, BoundarySpec(), options) == model.shipped()
+    assert begins_with(None, False, BoundarySpec(), options) is None
+
+
+def test_of_models_the_named_one_is_taken(made):
+    with pytest.raises(NeuralocksError, match="learned.neuralocks: differs from this training in"):
+        begins_with(made.model, False, BoundarySpec(linear="velocity"), RegressionOptions())
+
+
+@pytest.mark.parametrize("words", [("true", "false"), ("yes", "no"), ("1", "0"), ("True", "NO")])
+def test_yes_and_no_are_words_for_a_switch(words):
+    assert [parsed(RegressionOptions, {"static": word})["static"] for word in words] == [True, False]

@@ -66,8 +66,10 @@ def test_a_name_that_no_model_can_have_is_refused_before_training(tmp_path):
     pytest.importorskip("torch")
     shot = small_shot(tmp_path / "who.usda")
     before = shot.read_bytes()
-    with pytest.raises(NeuralocksError, match="who.usda: a model file ends in .neuralocks; choose such a name"):
-        train_rig(shot, shot, dynamic=False, steps=1, progress=lambda *_: pytest.fail("it is trained"))
+    (folder := tmp_path / "folder.neuralocks").mkdir()
+    for out, said in ((shot, "a model file ends in .neuralocks; choose such a name"), (folder, "is a folder; give a")):
+        with pytest.raises(NeuralocksError, match=f"{out.name}: {said}"):
+            train_rig(shot, out, dynamic=False, steps=1, progress=lambda *_: pytest.fail("it is trained"))
     assert shot.read_bytes() == before
 
 
