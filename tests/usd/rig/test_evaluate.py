@@ -11,7 +11,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
-from usd.rig.evaluate import evaluate_rig
+from usd.rig.evaluate import _Posed, evaluate_rig
 from usd.rig.stage import read_rigged_hair
 
 from ..commands import status
@@ -78,6 +78,11 @@ def test_depths_are_those_of_a_known_body(tmp_path, monkeypatch):
     assert few["body_frames"] == 2 and few["body"]["deepest_at"] not in (CODES[0], CODES[-1])
     for deepest in ("penetration_worst_mm", "deepest_at", "deepest"):
         assert few["body"][deepest] == card["body"][deepest], "the deepest frame counts, wherever it is"
+    assert few["body"]["penetration_percent"] == pytest.approx(100 * (depth[[0, -1]] > 2e-6).mean(), abs=0.01)
+    looked, seemingly = [], _Posed.seemingly
+    monkeypatch.setattr(_Posed, "seemingly", lambda posed, row, at: looked.append(row) or seemingly(posed, row, at))
+    monkeypatch.setattr("usd.rig.evaluate.LOOKED_AT", 4)
+    assert evaluate_rig(baked).measures["body_frames"] == 2 and looked == [7, 14, 21]
     assert card["body_frames"] == 25
     assert card["body"]["penetration_worst_mm"] == pytest.approx(1e3 * depth.max(), abs=0.01)
     assert card["body"]["penetration_percent"] == pytest.approx(100 * (depth > 2e-6).mean(), abs=0.01)
