@@ -98,6 +98,26 @@ def test_arms_are_lifted_outward_and_forward():
     assert max(highest) - min(lowest) > 0.3
 
 
+def test_shoulders_rise_a_little_with_the_arms(monkeypatch):
+    """Up to 19 degrees, each about the axis that lifts its own arm."""
+    turned = {}
+    monkeypatch.setattr(Puppet, "turn", lambda puppet, joint, turns: turned.setdefault(joint, turns))
+    monkeypatch.setattr(Puppet, "turn_further", lambda puppet, joint, turns: turned.setdefault(joint, turns))
+    highest = []
+    for seed in range(60):
+        puppet = Puppet(character(), np.arange(30) / 6)
+        turned.clear()
+        _posture(puppet, np.random.default_rng(seed))
+        for side, sign in (("left", 1), ("right", -1)):
+            arm, shoulder = (turned.get(f"{side}_{part}") for part in ("upper_arm", "shoulder"))
+            assert (arm is None) == (shoulder is None)
+            if arm is not None:
+                x, y, z = (sign * shoulder).T
+                assert not x.any() and not y.any() and (z >= 0).all() and (z <= sign * arm[:, 2]).all()
+                highest.append(z.max())
+    assert 0.25 < max(highest) <= 0.33 and 24 <= len(highest) <= 48
+
+
 def jumps(weights, seeds):
     """How many random clips lift the hips as only a jump does."""
     clips = (random_clip(person(), np.random.default_rng(seed), 3.65, wild=0, weights=weights) for seed in seeds)

@@ -81,6 +81,15 @@ def test_where_no_character_can_move_the_first_says_why(crowd, tmp_path):
     assert not (tmp_path / "out.usda").exists()
 
 
+@pytest.fixture
+def hearing():
+    """The tests may have been started deaf to Ctrl-C, as a shell's background jobs are."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("hearing")
 @pytest.mark.parametrize("work", ["stage.check_authored", "bake.BoundHair.of", "bake.MovedHair"])
 def test_who_stops_at_one_character_does_not_go_on_with_the_others(crowd, tmp_path, monkeypatch, work):
     """USD swallows Ctrl-C, and what it then says passes for something wrong with that character."""
