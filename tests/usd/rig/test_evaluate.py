@@ -11,7 +11,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
-from usd.rig.evaluate import _Posed, evaluate_rig
+from usd.rig.evaluate import RigCard, _Posed, evaluate_rig
 from usd.rig.stage import read_rigged_hair
 
 from ..commands import status
@@ -174,6 +174,30 @@ def test_hair_that_does_not_move_is_told(tmp_path, capsys):
     assert said.startswith("/Who/Rig: 3 hair joints in 1 chain\nmeasured: 9 vertices in 25 frames\n")
     assert "swing: none, as if hair were carried rigidly\n" in said and "inside the body: not measured" in said
     assert notes.startswith("note: /Who/Rig: no joint found for neck;")
+
+
+def test_a_card_says_in_words_what_was_measured():
+    """And no number where there is none: less than rounding, no pose that is held, no body."""
+    swing = {"vertices": 9, "frames": 25, "swing_mm": 1.26, "swing_most": "hair_0", "swing_most_mm": 0.06}
+    deep = {"penetration_percent": 1.5, "penetration_3mm_percent": 0.25, "penetration_worst_mm": 4.06}
+    bodies = {
+        "body_frames": 7,
+        "body": deep | {"deepest": "hair_0", "deepest_at": 7.5},
+        "body_rigid": {**dict.fromkeys(deep, 0.01), "deepest": "hair_0", "deepest_at": 1.0},
+    }
+    lines = RigCard(EXAMPLE, "/Who/Rig", swing | {"jitter_mm": 0.1234} | bodies, []).lines()
+    assert lines == [
+        "measured: 9 vertices in 25 frames",
+        "swing: 1.3 mm from hair carried rigidly, most of 'hair_0', 0.1 mm",
+        "held pose: jitter 0.123 mm",
+        "inside the body: 1.50 % of vertices, deeper than 3 mm 0.25 %, at most 4.1 mm ('hair_0' at 7.5), in 7 frames",
+        "inside the body, carried rigidly: 0.01 % of vertices, deeper than 3 mm 0.01 %, at most 0.0 mm, in 7 frames",
+    ]
+    rigid = RigCard(EXAMPLE, "/Who/Rig", swing | {"swing_most_mm": 0.01, "jitter_mm": np.nan}, []).lines()
+    assert rigid[1:] == [
+        "swing: none, as if hair were carried rigidly",
+        "inside the body: not measured, no body of this skeleton is near the hair",
+    ]
 
 
 def test_of_several_characters_the_baked_one_is_measured_and_others_are_told(tmp_path):
