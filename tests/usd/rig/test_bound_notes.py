@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a rig bake tells of a character that is not quite the one that its model was trained for, or that holds still."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pxr import Gf, UsdGeom, UsdSkel
+
+from neuralocks_core.errors import NeuralocksError
+from usd.rig.bake import bake_rig
+from usd.rig.stage import read_rigged_hair
+
+from ..rig_shots import hair_turns, model_for, small_shot
+
+CODES = [1, 7, 20]
+
+
+@pytest.fixture
+def model(tmp_path):
+    """A model for the plain small shot, of which `plain.usda` is a bake."""
+    shot = small_shot(tmp_path / "trained.usda")
+    model = model_for(read_rigged_hair(shot))
+    assert not any("model" in note for note in bake_rig(shot, tmp_path / "plain.usda", model).notes)
+    return model
+
+
+def _renamed(change):
+    """A change of the stage: other names for all six joints."""
+
+    def rename(stage):
+        for path in ("/Who/Rig", "/Who/Motion"):
+            joints = stage.GetPrimAtPath(path).GetAttribute("joints")
+            joints.Set([change(name) for name in joints.Get()])
+
+    return rename
+
+
+def test_joints_with_a_rigs_name_before_theirs_move_alike_and_are_told(edited, tmp_path, model):
+    shot = edited(_renamed(lambda path: "/".join(f"Ann_{name}" for name in path.split("/"))))
+    result = bake_rig(shot, tmp_path / "out.usda", model)
+    assert "model: its joints have other names here, 'Ann_hair_0' for 'hair_0'" in result.notes
+    np.testing.assert_array_equal(hair_turns(result.path, CODES), hair_turns(tmp_path / "plain.usda", CODES))
+
+
+def test_a_character_of_another_size_is_told(edited, tmp_path, model):
+    shot = edited(lambda stage: UsdGeom.XformCommonAPI(stage.GetPrimAtPath("/Who")).SetScale((1.2, 1.2, 1.2)))
+    (told,) = [note for note in bake_rig(shot, tmp_path / "out.usda", model).notes if "trained for" in note]
+    assert told.startswith("/Who/Rig: is 1.20 times as large as the character that the model was trained for;")
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_head_that_holds_a_turned_pose_is_told(edited, tmp_path, model, moves):
+    """Hair hangs from it as the pose has it, but one may have named another joint."""
+
+    def turn(stage):
+        rotations = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
+        for code in rotations.GetTimeSamples():
+            values = list(rotations.Get(code))
+            values[1] = Gf.Quatf(Gf.Rotation(Gf.Vec3d(1, 0, 0), 30 + moves * code).GetQuat())
+            rotations.Set(values, code)
+
+    result = bake_rig(edited(turn), tmp_path / "out.usda", model)
+    told = "/Who/Rig: its head joint 'head' does not move, so the hair is that of a held pose"
+    assert (told in result.notes) != moves
+    assert np.abs(hair_turns(result.path, CODES)[..., 1:]).max() > 0.01
+
+
+@pytest.mark.parametrize(("last", "told"), [("hair_3", False), ("hips", True)])
+def test_joints_that_blender_would_rename_are_told(edited, tmp_path, model, last, told):
+    shot = edited(_renamed(lambda path: path.replace("hair_3", last)))
+    said = "/Who/Rig: several joints are named 'hips'; Blender renames all but one"
+    assert (said in bake_rig(shot, tmp_path / "out.usda", model).notes) == told
+
+
+def test_where_a_model_does_not_fit_another_head_than_in_training_is_told(edited, tmp_path, model):
+    shot = edited(_renamed(lambda path: path.replace("hair_3", "kopf")), step=0.11)
+    for trained, told in (("kopf", True), ("head", False), ("gone", False), (None, False)):
+        other = replace(model, training={"reads": {"head": trained}})
+        with pytest.raises(NeuralocksError) as caught:
+            bake_rig(shot, tmp_path / "out.usda", other)
+        said = "; but in training the head was 'kopf', and here it is 'head': check --head first"
+        assert str(caught.value).endswith(said) == told, caught.value
