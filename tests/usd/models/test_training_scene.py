@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files and words that make no scene to train on, and which hair of a shot with several characters is whose."""
 
+from types import SimpleNamespace
+
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
-from usd.models.training_scene import training_scene
+from neuralocks_core.hairstyles import STYLES
+from usd.models.training_scene import MOST_STRANDS, training_scene
 
 from ..shots import HAIR, Recipe, edited, write_shot
 
@@ -52,3 +55,47 @@ def test_hair_is_of_the_skeleton_that_it_names(tmp_path):
         assert any("/Anna/Bun: is hair of /Bert/Rig, not of /Anna/Rig; left out" in note for note in told) == (
             count == 1
         )
+
+
+@pytest.mark.parametrize(
+    ("grooms", "styles"), [(["library"], [*STYLES]), ([[*STYLES][2], [*STYLES][1]], [*STYLES][1:3])]
+)
+def test_styles_of_the_library_are_grown_alike_alone_and_among_all(tmp_path, monkeypatch, grooms, styles):
+    """And all else that is asked for is in the scene."""
+    shot, said = write_shot(tmp_path, Recipe(bound="mesh")), []
+    monkeypatch.setattr("usd.models.training_scene.Barber", lambda character: SimpleNamespace(grow=lambda *how: how))
+    monkeypatch.setattr("usd.models.training_scene._strands", lambda how, character: how)
+    asked = {"seed": 5, "gestures": {"bow": 2.0}, "frames": 40}
+    scene = training_scene(shot, grooms, variations=1, progress=lambda *words: said.append(words), **asked)
+    places = [*STYLES]
+    wanted = [(style, MOST_STRANDS, 5 + places.index(style), again) for again in (0, 1) for style in styles]
+    assert list(scene.grooms) == wanted
+    assert said == [(done, len(wanted), f"growing {how[0]}") for done, how in enumerate(wanted)]
+    assert {name: getattr(scene, name) for name in asked} == asked
+    for most in (0, 50):
+        assert len(training_scene(shot, grooms, variations=most).grooms) == len(styles) * (1 + most)
+
+
+def test_motion_that_is_long_enough_is_not_told(tmp_path, monkeypatch):
+    shot = write_shot(tmp_path, Recipe(bound="mesh"))
+    for least, short in ((0.6, True), (0.05, False)):
+        told = []
+        monkeypatch.setattr("neuralocks_core.training.rollouts.LEAST", least)
+        training_scene(shot, motion=[shot], tell=told.extend)
+        assert any("too short to learn from" in note for note in told) == short
+
+
+def test_what_is_no_hair_beside_hair_is_not_learned_from(tmp_path):
+    """Grass of the set, far from the head, and strands that are points."""
+    shot = write_shot(tmp_path, Recipe(bound="none"))
+    stage = Usd.Stage.Open(str(shot))
+    layer = stage.GetRootLayer()
+    for name in ("Grass", "Dots"):
+        Sdf.CopySpec(layer, HAIR, layer, f"/Hero/{name}")
+        points = UsdGeom.BasisCurves(stage.GetPrimAtPath(f"/Hero/{name}")).GetPointsAttr()
+        at = points.Get()
+        points.Set([at[0]] * len(at) if name == "Dots" else [(x, y - 9, z) for x, y, z in at])
+    layer.Save()
+    told = []
+    assert len(training_scene(shot, tell=told.extend).grooms) == 1
+    assert not any("lies" in note for note in told)
