@@ -65,11 +65,11 @@ class Skeleton:
                 result[parent].append(joint)
         return result
 
-    def below(self, joint: int) -> np.ndarray:
-        """Which joints (J,) bool are this one or below it."""
+    def below(self, *joints: int) -> np.ndarray:
+        """Which joints (J,) bool are one of these or below one."""
         result = [False] * len(self.names)
         for other, parent in enumerate(self.parents.tolist()):
-            result[other] = other == joint or (parent >= 0 and result[parent])
+            result[other] = other in joints or (parent >= 0 and result[parent])
         return np.array(result)
 
 
@@ -230,7 +230,7 @@ class Character:
     @cached_property
     def of_head(self) -> np.ndarray:
         """Which joints (J,) bool are one of the `heads` or below one."""
-        return np.any([self.skeleton.below(joint) for joint in self.heads], axis=0)
+        return self.skeleton.below(*self.heads)
 
     @cached_property
     def on_head(self) -> np.ndarray | None:

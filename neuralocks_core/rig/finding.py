@@ -96,8 +96,7 @@ def left_out(
     skeleton, found = character.skeleton, []
     drives, body = driving(skeleton, meshes), of_the_body(character, meshes)
     face, feature = (np.array([says(name) for name in character.own_names]) for says in (says_face, says_feature))
-    tops = [] if chains is None else chains.joints[chains.roots]
-    moved = np.any([np.zeros(len(face), bool), *map(skeleton.below, tops)], axis=0)
+    moved = skeleton.below(*([] if chains is None else chains.joints[chains.roots]))
     beside = _beside(skeleton, meshes, moved) & ~body
 
     def in_a_row(joint: int) -> int:
@@ -173,11 +172,8 @@ def _by_pattern(character: Character, patterns: list[str]) -> list[int]:
             f"skeleton: joint '{leaf(names[hits[0]])}' does not hang below the head joint '{head}', but from '{above}': name that "
             f"with --head {above}, as in training, or name other joints"
         )
-    hits = inside  # joints of a tail or a coat may have the same names
-    inner = np.zeros(len(names), bool)
-    for joint, parent in enumerate(parents):
-        inner[joint] = parent >= 0 and (inner[parent] or parent in hits)
-    return [joint for joint in hits if not inner[joint]]
+    below = character.skeleton.below(*inside)  # joints of a tail or a coat may have the same names, too
+    return [joint for joint in inside if not below[parents[joint]]]
 
 
 def _children(character: Character) -> list[int]:
@@ -215,9 +211,8 @@ def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[i
             tops.append(joint)
         else:
             short.append(joint)
-    found = np.any([np.zeros(len(names), bool), *map(skeleton.below, tops)], axis=0)
     # An end joint that every bone has tells nothing, but hair's own mesh does.
-    beside = _beside(skeleton, meshes or [], found)
+    beside = _beside(skeleton, meshes or [], skeleton.below(*tops))
     return tops + [joint for joint in short if beside[skeleton.below(joint)].any()]
 
 

@@ -21,13 +21,12 @@ def in_chains(character: Character, tops: list[int], drives: np.ndarray, named: 
         named: joints that somebody named: what is worn in hair is then hair.
     """
     skeleton = character.skeleton
-    inside = np.any([skeleton.below(top) for top in tops], axis=0)
+    inside = skeleton.below(*tops)
     for joint in np.flatnonzero(inside):
         ride = riders(character, joint, drives)
         if joint not in tops and joint not in named and _only_worn(character, joint, drives):
             ride.append(joint)
-        for each in ride:
-            inside[skeleton.below(each)] = False
+        inside[skeleton.below(*ride)] = False
     return inside
 
 

@@ -95,4 +95,4 @@ def assemble_rig(
 
 def moving_joints(skeleton: Skeleton, chains: HairChains) -> np.ndarray:
     """Which joints (J,) are hair or below hair."""
-    return np.any([skeleton.below(joint) for joint in chains.joints[chains.roots]], axis=0)
+    return skeleton.below(*chains.joints[chains.roots])

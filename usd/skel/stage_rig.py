@@ -109,8 +109,7 @@ class StageRig:
             replaced: joints that a bake replaces; how these move does not matter.
         """
         turn = loop_turns(self.cycle.joints[[0, -1]])
-        for joint in replaced:  # with what hangs from it
-            turn[self.character.skeleton.below(joint)] = 0
+        turn[self.character.skeleton.below(*replaced)] = 0  # with what hangs from them
         start, end = self.time_codes[self._repeated][[0, -1]]
         notes = []
         if len(self.time_codes) < 2:
