@@ -279,7 +279,7 @@ def _prims(parts: list[_Part], stage: Usd.Stage) -> list[Sdf.PrimSpec]:
     for part in parts:
         for prim in part.prims():
             found.setdefault(prim.path, prim)
-    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate))
+    every = stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate))
     place = {path: number for number, path in enumerate(prim.GetPath() for prim in every)}
     return sorted(found.values(), key=lambda prim: place.get(prim.path, len(place)))
 

@@ -142,7 +142,7 @@ def check_not_input(out: Path, stage: Usd.Stage) -> None:
                 raise NeuralocksError(
                     f"{out}: {layer.GetDisplayName()} refers to it, as a layer or in a variant or payload; choose another name"
                 )
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if any(one_file(out, asset.resolvedPath) for asset in _clips(prim)):
             raise NeuralocksError(f"{out}: is a value clip of {prim.GetPath()}; choose another name")
 

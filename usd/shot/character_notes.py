@@ -141,7 +141,7 @@ def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[s
 def _unused_meshes(stage: Usd.Stage) -> tuple[dict[str, list[Usd.Prim]], list[Usd.Prim]]:
     """Hidden meshes that a skeleton moves, by its path, and visible ones that no skeleton moves."""
     hidden, loose = {}, []
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if prim.IsA(UsdGeom.Mesh):
             seen, skeleton = drawn(prim), bound_skeleton(prim)
             if seen and skeleton is None:

@@ -25,9 +25,7 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
     Raises:
         NeuralocksError: a wanted path is not a groom.
     """
-    every = [
-        p for p in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.BasisCurves)
-    ]
+    every = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.BasisCurves)]
     if not wanted:
         return every
     chosen = set()

@@ -38,7 +38,7 @@ def of_other_kinds(stage: Usd.Stage) -> list[str]:
 
 
 def _others(stage: Usd.Stage) -> list[Usd.Prim]:
-    every = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    every = stage.Traverse(Usd.TraverseInstanceProxies())
     return [prim for prim in every if prim.IsA(UsdGeom.NurbsCurves) or prim.IsA(UsdGeom.HermiteCurves)]
 
 

@@ -117,8 +117,7 @@ def find_skeletons(stage: Usd.Stage, wanted: str | None = None) -> list[Usd.Prim
     Raises:
         NeuralocksError: there is no such skeleton, or there are several.
     """
-    below = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
-    every = [prim for prim in below if prim.IsA(UsdSkel.Skeleton)]
+    every = [prim for prim in stage.Traverse(Usd.TraverseInstanceProxies()) if prim.IsA(UsdSkel.Skeleton)]
     if wanted is None:
         return every
     found = [prim for prim in every if wanted in (str(prim.GetPath()), prim.GetName())]

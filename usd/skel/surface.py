@@ -55,7 +55,7 @@ Skins = dict[str, list[Usd.Prim]]
 def find_skins(stage: Usd.Stage) -> Skins:
     """The skinned meshes of a stage, searched once: a set may have many more meshes than its characters."""
     found: Skins = {}
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if prim.IsA(UsdGeom.Mesh) and (skeleton := bound_skeleton(prim)) is not None:
             found.setdefault(skeleton, []).append(prim)
     return found
