@@ -11,7 +11,7 @@ from neuralocks_core.rotation import transformed
 
 from ..border.placement import Placement, Unplaced
 from ..border.values import as_numbers
-from ..skel.binding import rest_value
+from ..skel.binding import lineage, rest_value
 from ..skel.keys import changes
 from ..skel.stage_rig import StageRig
 from .attach import REACH
@@ -52,10 +52,8 @@ def drawn_as_copies(prims: Sequence[Usd.Prim]) -> tuple[dict[Usd.Prim, str], lis
     """
     found, moved, characters = {}, {}, {}
     for prim in prims:
-        above = prim.GetParent()
-        while above and not above.IsA(UsdGeom.PointInstancer):
-            above = above.GetParent()
-        if not above:
+        above = next((each for each in lineage(prim) if each.IsA(UsdGeom.PointInstancer)), None)
+        if above is None:
             continue
         kinds = UsdGeom.PointInstancer(above).GetPrototypesRel().GetTargets()
         kind = next((path for path in kinds if prim.GetPath().HasPrefix(path)), prim.GetPath())

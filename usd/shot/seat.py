@@ -103,22 +103,18 @@ def _find_seat(
 ) -> Seat | None:
     best = None
     drifts = None if when is not None or not rig.meshes else drifts_of(rig, placement)  # the same for all meshes
-
-    def nearest(best: Seat | None, mesh, skin, way: tuple[bool, int], to_bind) -> Seat | None:
-        placed = transformed(roots, to_bind)
-        # In a crowd nearly all skins are far, and finding the nearest point of a far one takes a hundred times as long as finding
-        # that none is near. Twice the bound, because what is nearer by another way must be CLEARLY nearer.
-        middle = float(np.median(skin.query(placed, CLEARLY * within)[0]))
-        clear = CLEARLY if best is not None and way > best.way else 1
-        better = np.isfinite(middle) and (best is None or clear * middle < best.distance - 1e-4)
-        return Seat(middle, rig, mesh, to_bind, way, placed, skin) if better else best
-
     for likely in (True, False):
         if best is not None and best.distance <= NEAR:
             break
         for mesh, skin in zip(rig.meshes, rig.skins, strict=True):
             for place, to_bind in enumerate(ways(rig, mesh, placement, when, likely=likely, drifts=drifts)):
-                best = nearest(best, mesh, skin, (not likely, place), to_bind)
+                placed, way = transformed(roots, to_bind), (not likely, place)
+                # In a crowd nearly all skins are far, and finding the nearest point of a far one takes a hundred times as long as
+                # finding that none is near. Twice the bound, because what is nearer by another way must be CLEARLY nearer.
+                middle = float(np.median(skin.query(placed, CLEARLY * within)[0]))
+                clear = CLEARLY if best is not None and way > best.way else 1
+                if np.isfinite(middle) and (best is None or clear * middle < best.distance - 1e-4):
+                    best = Seat(middle, rig, mesh, to_bind, way, placed, skin)
     at_rest = rest_way(rig, placement, when, drifts) if rig.meshes else None
     if best is not None and best.distance <= NEAR:
         others = ways(rig, best.mesh, placement, when, likely=False, drifts=drifts)

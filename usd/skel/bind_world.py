@@ -11,6 +11,7 @@ from neuralocks_core.rotation import inverses, sizes, sizes_shown
 
 from ..border.placement import Placement
 from ..border.units import Border
+from .binding import lineage
 from .joints import JointSource
 
 ALIKE = 1e-4
@@ -65,15 +66,13 @@ def bind_shown(source: JointSource) -> np.ndarray:
     world's as USD means them, which differ where its prim is moved. If the rest pose shows them neither there nor where a prim above, as
     a reference to a whole file, puts that world, it is another pose, and they are taken as the skeleton's own.
     """
-    own, above, bind = source.placement.reference, source.prim.GetParent(), source.bind
+    own, bind = source.placement.reference, source.bind
     solid = np.abs(np.linalg.det(bind[:, :3, :3])) > np.finfo(float).tiny
     shown, reach = source.at_rest[solid] @ inverses(bind[solid]), 1 + np.abs(bind[:, :3, 3]).max()
     if not len(shown) or _apart(shown, shown[0], reach).max() > ALIKE or _apart(own, shown[0], reach) <= ALIKE:
         return own
-    worlds = [np.eye(4)]
-    while not above.IsPseudoRoot():
-        worlds += [Placement(above).reference] if above.IsA(UsdGeom.Xformable) else []
-        above = above.GetParent()
+    above = (prim for prim in lineage(source.prim.GetParent()) if prim.IsA(UsdGeom.Xformable))
+    worlds = [np.eye(4), *(Placement(prim).reference for prim in above)]
     return shown[0] if _apart(np.array(worlds), shown[0], reach).min() <= ALIKE else own
 
 
