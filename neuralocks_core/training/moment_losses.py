@@ -143,12 +143,12 @@ def _carried(transform: Tensor, points: Tensor) -> Tensor:
 
 
 def _stacked(hair: list[Hair], device: str) -> Rods:
-    fields = ("rest", "length", "voronoi", "mass", "support")
-    return Rods(*(torch.stack([getattr(h.rods, name) for h in hair]).to(device) for name in fields))
+    fields = vars(hair[0].rods)
+    return Rods(**{name: torch.stack([getattr(h.rods, name) for h in hair]).to(device) for name in fields})
 
 
 def _one(rods: Rods, i: int) -> Rods:
-    return Rods(*(getattr(rods, name)[i : i + 1] for name in ("rest", "length", "voronoi", "mass", "support")))
+    return Rods(**{name: each[i : i + 1] for name, each in vars(rods).items()})
 
 
 def _tensor(array: np.ndarray, device) -> Tensor:

@@ -94,15 +94,8 @@ class MomentPool:
 
     def grow(self) -> None:
         """Add the moments of another random clip."""
-        self._add(len(self.hair))
-
-    def batch(self, rng: np.random.Generator, count: int) -> tuple[list[Moment], list[Hair]]:
-        """Random moments and the hair of each."""
-        moments = [self.moments[i] for i in rng.integers(len(self.moments), size=count)]
-        return moments, [self.hair[moment.hair] for moment in moments]
-
-    def _add(self, index: int) -> None:
-        maker, draw = self._maker, self._maker.draw(index)
+        index, maker = len(self.hair), self._maker
+        draw = maker.draw(index)
         draw = replace(draw, materials=tuple(replace(material, weight=1.0) for material in draw.materials))
         character, groom = self.scene.character, self.scene.grooms[draw.groom]
         vectors, bind = maker.vectors(draw, self.scene.spec)
@@ -124,7 +117,12 @@ class MomentPool:
             if bodies is not None:
                 surface, normals = surface_tree(bodies[i]), vertex_normals(bodies[i], maker.body.triangles)
             gravity = head[t, :3, :3].T @ GRAVITY
-            self.moments.append(Moment(len(self.hair) - 1, vectors[t - 2 : t + 1], gravity, back[i], surface, normals))
+            self.moments.append(Moment(index, vectors[t - 2 : t + 1], gravity, back[i], surface, normals))
+
+    def batch(self, rng: np.random.Generator, count: int) -> tuple[list[Moment], list[Hair]]:
+        """Random moments and the hair of each."""
+        moments = [self.moments[i] for i in rng.integers(len(self.moments), size=count)]
+        return moments, [self.hair[moment.hair] for moment in moments]
 
     def _hair(self, draw, groom, rest: np.ndarray, bind: np.ndarray) -> Hair:
         constants = rods(torch.from_numpy(rest.astype(np.float32)), supported=self.supported)

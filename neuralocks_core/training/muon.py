@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Muon: gradient descent whose steps have singular values of one, for the weight matrices of a network."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import torch
 
@@ -36,17 +36,12 @@ class Muon(torch.optim.Optimizer):
         super().__init__(matrices, {"lr": lr, "weight_decay": weight_decay})
 
     @torch.no_grad()
-    def step(self, closure: Callable[[], float] | None = None) -> float | None:
-        """One step from the gradients that the parameters hold; `closure`, if given, computes them first."""
-        loss = None
-        if closure is not None:
-            with torch.enable_grad():
-                loss = closure()
+    def step(self) -> None:
+        """One step from the gradients that the parameters hold."""
         for group in self.param_groups:
             for matrix in group["params"]:
                 if matrix.grad is not None:
                     self._move(matrix, group["lr"], group["weight_decay"])
-        return loss
 
     def _move(self, matrix: torch.nn.Parameter, rate: float, decay: float) -> None:
         state = self.state[matrix]
