@@ -69,9 +69,10 @@ class RigModel:
     credits: list = field(default_factory=list)
 
     def __post_init__(self):
-        layers = tuple((np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in self.layers)
+        with np.errstate(over="ignore"):  # what is too large becomes infinite, which is refused
+            layers = tuple((np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in self.layers)
+            object.__setattr__(self, "limits", np.asarray(self.limits, np.float32))
         object.__setattr__(self, "layers", layers)
-        object.__setattr__(self, "limits", np.asarray(self.limits, np.float32))
         size = self.inputs
         if not layers:
             raise NeuralocksError("model: it has no layers; get an undamaged copy")
@@ -190,16 +191,13 @@ class RigModel:
     @classmethod
     def _of(cls, meta: dict) -> "RigModel":
         try:
-            with np.errstate(over="ignore"):  # what is too large becomes infinite, which is refused
-                layers = tuple((np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in meta["layers"])
-                limits = np.asarray(meta["limits"], np.float32)
             return cls(
-                HairChains.from_json(meta["chains"]),
-                BoundarySpec.from_json(meta["boundary"]),
-                layers,
-                limits,
-                float(meta["max_angle"]),
-                *(meta[name] for name in ("training", "report", "credits")),
+                layers=meta["layers"],
+                limits=meta["limits"],
+                chains=HairChains.from_json(meta["chains"]),
+                spec=BoundarySpec.from_json(meta["boundary"]),
+                max_angle=float(meta["max_angle"]),
+                **{name: meta[name] for name in ("training", "report", "credits")},
             )
         except NeuralocksError:
             raise
