@@ -132,7 +132,7 @@ def bake_rig(
     counter = _Counter(sum(len(one.codes) for one in bound), progress)
 
     def moved(one: BoundHair) -> MovedHair:
-        turns, held = one.turns(loop, strength, in_core(blown, one.hair.border), counter)
+        turns, held = one.turns(loop, strength, in_core(blown, one.hair.source.border), counter)
         said.extend(held + one.hair.source.notes)  # also on poses between those of the clip
         return MovedHair(one.hair, one.codes, turns, one.outdated)
 

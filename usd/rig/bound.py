@@ -69,7 +69,7 @@ class BoundHair:
         first, last = frame_range(hair.stage, [hair.source])
         if windy:
             check_frames_named(hair.path, frames, first, last, [hair.source])
-        wanted = time_codes(frames, first, last, subframes, hair.border.frame, hair.source.source.keys.every)
+        wanted = time_codes(frames, first, last, subframes, hair.source.border.frame, hair.source.source.keys.every)
         return cls(hair, model, size, trained_name, wanted, _with_samples(hair, wanted), _outdated(hair))
 
     @property
@@ -101,7 +101,7 @@ class BoundHair:
         turns = np.empty((len(self.codes), len(chains), 4))
         for row, code in enumerate(self.codes):
             # One at a time: a matrix product may round otherwise for other batches.
-            second = self.hair.border.seconds([code])
+            second = source.border.seconds([code])
             wrapped = clip.loop and not clip.start <= second[0] <= clip.end
             shown = clip.at(second) if wrapped else source.joints_at(code)[None]
             turns[row] = carried.turns(second, strength, shown, wind)[0]
@@ -196,7 +196,7 @@ def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:
     # A frame and a sample at the same time, up to rounding, are one.
     edges = np.array([-np.inf, *own, np.inf])
     after = np.searchsorted(edges, wanted)
-    near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= SAME * hair.border.frame
+    near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= SAME * hair.source.border.frame
     return sorted({*np.array(wanted)[~near].tolist(), *own})
 
 

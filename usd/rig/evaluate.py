@@ -122,7 +122,7 @@ def evaluate_rig(
     off, jitter, seen, deep = _moved(posed, moving, say)
     each = {i: float(np.sqrt(off[lock == i].mean())) for i in np.unique(lock)}
     most = max(each, key=each.__getitem__)
-    wind = source.source.animation and recorded_wind(source.source.animation, hair.border)
+    wind = source.source.animation and recorded_wind(source.source.animation, source.border)
     if wind and wind.gusts:  # no hair comes to rest
         jitter = float("nan")
     measures = {

@@ -61,7 +61,7 @@ def write_rig_layer(characters: list[MovedHair], shot: Path, out: Path, facts: d
     """
     layer, hair = Sdf.Layer.CreateAnonymous(out.suffix), characters[0].hair
     codes = sorted({code for character in characters for code in character.codes})
-    write_header(layer, hair.stage, hair.border, shot, out, codes)
+    write_header(layer, hair.stage, hair.source.border, shot, out, codes)
     paths = [_write_animation(layer, character) for character in characters]
     for path in paths:
         record(layer.GetPrimAtPath(path), facts)

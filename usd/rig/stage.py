@@ -48,7 +48,6 @@ class RiggedHair:
 
     Attributes:
         stage: the shot.
-        border: its units.
         source: skeleton, body and clip as read.
         rig: hair and body, separated.
         others: other skeletons with hair chains, from which this one was chosen.
@@ -56,7 +55,6 @@ class RiggedHair:
     """
 
     stage: Usd.Stage = field(repr=False)
-    border: Border
     source: StageRig = field(repr=False)
     rig: HairRig = field(repr=False)
     others: tuple[str, ...] = ()
@@ -159,7 +157,7 @@ def read_rigged_hairs(
             error = reworded(error, _with_path(prim, error))
             errors.append(_Unusable(str(prim.GetPath()), _is_hairy(prim, model), error))
             continue
-        found.append(RiggedHair(stage, border, source, rig))
+        found.append(RiggedHair(stage, source, rig))
     # Hair may have its own skeleton besides the body's; the error should not be that the body's has no hair.
     hairy = [each for each in errors if each.hairy]
     if not found:
