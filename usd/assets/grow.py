@@ -23,6 +23,7 @@ from neuralocks_core.progress import Progress, silent, within
 from ..border.stage_files import check_layer_name, check_not_input, check_not_over
 from ..shot.notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
+from ..skel.stage_rig import StageRig
 from .groom import Over, write_groom
 
 HOLLOW = 0.003
@@ -66,18 +67,31 @@ def grow(
     out, with_character = as_path(out, "out"), flag("--with-character", with_character)
     check_layer_name(out)
     check_style(style, count, variation, seed)
-    rigs = read_rigs(character, skeleton, head)
-    rig = rigs[0]
-    (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
+    rig, over, notes = whose_head(character, skeleton, head, out, with_character)
     check_writable(out)
-    over = Over(rig, as_path(character, "character")) if with_character else None
     if tell:
-        tell([*first_of(rigs), *rig.notes, *unlikely_head(rig), *(over.notes() if over else [])])
+        tell(notes)
     say = progress or silent
     say(0, 1000, "looking at the head")
     groom = Barber(rig.character).grow(style, count, seed, variation, within(say, _SEEN, _GROWN))
     say(_GROWN, 1000, f"writing {out.name}")
     return write_groom(out, groom, rig, over)
+
+
+def whose_head(
+    character, skeleton: str | None, head: str | None, out: Path, with_character: bool
+) -> tuple[StageRig, Over | None, list[str]]:
+    """The character that gets hair, what the hair is written over, if anything, and what a user should know of both.
+
+    Args:
+        character, skeleton, head, with_character: as for `grow`.
+        out: checked not to be one of the character's files.
+    """
+    rigs = read_rigs(character, skeleton, head)
+    rig = rigs[0]
+    (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
+    over = Over(rig, as_path(character, "character")) if with_character else None
+    return rig, over, [*first_of(rigs), *rig.notes, *unlikely_head(rig), *(over.notes() if over else [])]
 
 
 class Barber:

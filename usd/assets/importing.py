@@ -17,13 +17,11 @@ from neuralocks_core.hairstyles.fitting import sized
 from neuralocks_core.progress import Progress, silent, within
 
 from ..baking.undrawn_points import UndrawnPoints
-from ..border.stage_files import OTHERS, USD, check_layer_name, check_not_input, check_not_over
-from ..shot.notes import first_of, unlikely_head
-from ..shot.stage import read_rigs
+from ..border.stage_files import OTHERS, USD, check_layer_name
 from ..skel.stage_rig import StageRig
 from .beside import Beside, Primvar
-from .groom import Authored, Over, write_grooms
-from .grow import Barber
+from .groom import Authored, write_grooms
+from .grow import Barber, whose_head
 from .usd_hair import read_usd
 
 _READ, _LAID = 400, 950
@@ -78,11 +76,7 @@ def import_groom(
     say = progress or silent
     if character is not None:
         say(0, 1000, "looking at the head")
-        rigs = read_rigs(character, skeleton, head)
-        rig = rigs[0]
-        (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
-        over = Over(rig, as_path(character, "character")) if with_character else None
-        notes += [*first_of(rigs), *rig.notes, *unlikely_head(rig), *(over.notes() if over else [])]
+        rig, over, notes = whose_head(character, skeleton, head, out, with_character)
     counted, told = (unit, []) if unit is not None else _common_unit(sources, rig is not None)
     notes += told
     for number, path in enumerate(sources):
