@@ -17,7 +17,7 @@ from ..border.stage_files import check_not_input, open_stage
 from ..border.stopping import check
 from ..border.units import Border
 from ..shot.alike import one_person
-from ..shot.attach import Attachment, off_head
+from ..shot.attach import Attachment
 from ..shot.curve_ends import beyond_ends
 from ..shot.curves import find_curves, read_groom, widths_attribute, without_points
 from ..shot.groom_notes import groom_notes, no_points
@@ -114,7 +114,7 @@ def _facing_forward(
     """The curves of the first character, each with its way (4, 4) to that one's bind pose, turned to face +Z and scaled; and notes on how
     its head faces where the hair is shown, and on the hair of other characters.
     """
-    first = next((each for each in carried.values() if not off_head(each)), next(iter(carried.values()))).rig
+    first = next((each for each in carried.values() if not each.off_head), next(iter(carried.values()))).rig
     turn, found, others = np.eye(4), [], []
     turn[:3, :3] = scale * first.character.facing
     for prim, each in carried.items():

@@ -8,7 +8,7 @@ from neuralocks_core.materials import Material
 from neuralocks_core.models.model_file import shipped, specialists
 from neuralocks_core.models.runtime import StrandModel
 
-from ..shot.attach import Attachment, off_head
+from ..shot.attach import Attachment
 from ..shot.character_notes import untrained
 from ..shot.notes import without_strength
 
@@ -26,7 +26,7 @@ def model_notes(
 def learned(model: StrandModel, moved: Iterable[Attachment]) -> list[str]:
     """Those of a shot's notes that do not hold for a model: of characters whose measures it was trained on."""
     carriers = {each.character: each for each in moved}  # not each groom: they are measured
-    found = [each for each in carriers.values() if not off_head(each)]
+    found = [each for each in carriers.values() if not each.off_head]
     known = [each for each in found if model.knows(each.character, each.rig.clip)]
     return [note for each in known for note in untrained(each.carrying)]
 
@@ -46,7 +46,7 @@ def _unheard(model: StrandModel, material: Material) -> list[str]:
 
 def _other_bodies(model: StrandModel, moved: Iterable[Attachment]) -> list[str]:
     """The notes on characters whose measures differ from those that a model was trained on."""
-    on_heads = {each.rig.path: each for each in moved if not off_head(each)}  # a chest does not have a head's measures
+    on_heads = {each.rig.path: each for each in moved if not each.off_head}  # a chest does not have a head's measures
     own = model.file.path in (shipped(), *specialists())
     remedy = "use the shipped model, or train one on this character"
     if own:  # of those whose size no model knows, the shot's notes tell

@@ -143,7 +143,7 @@ def _file(
     # If there is hair, far curves such as the grass of a set are not hair; nor are the rig's controls.
     near = [(prim, attachment) for prim, attachment in found if not attachment.far] or found
     notes += [
-        f"{prim.GetPath()}: lies {a.far:.3g} m from joint '{leaf(a.rig.source.names[a.character.carrying_joint])}' of {rig.path} and on "
+        f"{prim.GetPath()}: lies {a.far:.3g} m from joint '{leaf(a.joint)}' of {rig.path} and on "
         "no skin, so this trains on hair that is not on the head; put it where the head is in the bind pose, and check the file's "
         "metersPerUnit and upAxis"
         for prim, a in near

@@ -19,7 +19,6 @@ from ..baking.model_notes import model_notes
 from ..border.placement import Placement
 from ..border.units import Border
 from ..border.values import as_numbers
-from ..shot.attach import rig_joint
 from ..shot.curve_ends import groom_between, undrawn
 from ..shot.curves import rest_counts
 from ..shot.gaps import gaps
@@ -78,7 +77,7 @@ def _groom(
             if found is None:
                 return None
             to_bind, drawn = found.to_bind, found.drawn
-            joint = {"skeleton": found.rig.path, "joint": rig_joint(found), "carried by": found.how}
+            joint = {"skeleton": found.rig.path, "joint": found.joint, "carried by": found.how}
         except NeuralocksError as error:
             stops.append(str(error))
     else:

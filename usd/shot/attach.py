@@ -69,6 +69,17 @@ class Attachment:
         """The skeleton, with the character of the joint that carries the groom."""
         return replace(self.rig, character=self.character)
 
+    @property
+    def joint(self) -> str:
+        """Path of the carrying joint."""
+        return self.rig.source.names[self.character.carrying_joint]
+
+    @property
+    def off_head(self) -> bool:
+        """Whether the carrying joint takes the role of the head while the rig has one elsewhere, as for fur on a chest."""
+        own = self.rig.character.humanoid.get("head")
+        return own not in (None, self.character.head) and self.character.head != head_by_name(self.rig)
+
 
 def attach(
     prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: str | None, notes: list[str]
@@ -153,17 +164,6 @@ def of_another(
     except NeuralocksError:  # not clear
         return None
     return None if found.far else next((rig for rig in others if rig is found.rig), None)
-
-
-def rig_joint(found: Attachment) -> str:
-    """Path of the carrying joint."""
-    return found.rig.source.names[found.character.carrying_joint]
-
-
-def off_head(found: Attachment) -> bool:
-    """Whether the carrying joint takes the role of the head while the rig has one elsewhere, as for fur on a chest."""
-    own = found.rig.character.humanoid.get("head")
-    return own not in (None, found.character.head) and found.character.head != head_by_name(found.rig)
 
 
 def on_head(prim: Usd.Prim, found: Attachment) -> bool:

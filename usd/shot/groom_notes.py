@@ -10,7 +10,7 @@ from neuralocks_core.strands.arclength import count_pointlike
 
 from ..border.units import Border
 from ..skel.stage_rig import StageRig
-from .attach import Attachment, rig_joint
+from .attach import Attachment
 
 
 def groom_notes(prim: Usd.Prim, groom: Groom, border: Border) -> list[str]:
@@ -73,7 +73,7 @@ def unusable_skeleton(path: str, own: str, bound: bool, named: bool = False) -> 
 def too_far(prim: Usd.Prim, found: Attachment, named: bool = False) -> str:
     """The note on curves that start too far from any head to be taken for hair, unless their user named them."""
     where = (
-        f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{leaf(rig_joint(found))}' of {found.rig.path} "
+        f"{prim.GetPath()}: lies {found.far:.3g} m from joint '{leaf(found.joint)}' of {found.rig.path} "
         f"and on no skin{found.rig.border.foreign(prim.GetAttribute('points'))}"
     )
     if named:

@@ -12,7 +12,7 @@ from neuralocks_core.errors import NeuralocksError
 from ..border.placement import Placement, Unplaced
 from ..skel.binding import bound_skeleton
 from ..skel.stage_rig import StageRig
-from .attach import Attachment, attach, of_another, off_head, rig_joint
+from .attach import Attachment, attach, of_another
 from .character_notes import unevenly_scaled
 from .curve_ends import undrawn
 from .curves import left_as_they_are, without_points
@@ -148,9 +148,9 @@ class HairSearch:
             self._far.append(too_far(prim, found))
             return None
         self._notes += [too_far(prim, found, named=True)] if found.far else []
-        away = off_head(found)
+        away = found.off_head
         if away and not found.told:
-            self._off_head.append(f"{path}: rides on '{leaf(rig_joint(found))}', not on a head")
+            self._off_head.append(f"{path}: rides on '{leaf(found.joint)}', not on a head")
         if found.character not in self._of_characters:
             self._of_characters[found.character] = unevenly_scaled(found.carrying)
             if not away:

@@ -7,7 +7,7 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.groom import Groom
 from neuralocks_core.sketch import alike, sketch
 
-from .attach import Attachment, rig_joint
+from .attach import Attachment
 from .recorded import recorded, recorded_joint, seen_as_written
 
 INPUTS = "inputs"
@@ -40,7 +40,7 @@ def baked_from_others(prim: Usd.Prim, found: Attachment, groom: Groom) -> list[s
     body's, they cannot be compared.
     """
     told, border = recorded(prim), found.rig.border
-    if INPUTS not in told or not seen_as_written(prim, border) or recorded_joint(prim) != rig_joint(found):
+    if INPUTS not in told or not seen_as_written(prim, border) or recorded_joint(prim) != found.joint:
         return []
     if not _mapped_as(told.get("joints"), found):
         return []

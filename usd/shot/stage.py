@@ -20,7 +20,7 @@ from ..border.units import Border
 from ..skel.cut_samples import within
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
-from .attach import Attachment, off_head, rig_joint
+from .attach import Attachment
 from .character_notes import lies_down, untrained, weight_notes, without_body
 from .curve_ends import Beyond, groom_between
 from .curves import find_curves
@@ -70,7 +70,7 @@ class StageGroom:
     @property
     def joint(self) -> str:
         """Path of the joint that carries it."""
-        return rig_joint(self.attachment)
+        return self.attachment.joint
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ def _notes_on_motion(grooms: list[StageGroom]) -> list[str]:
         carrying = attachment.carrying
         if stops := without_turn(carrying):
             raise NeuralocksError(stops[0])
-        notes += rig_notes(attachment.rig) if off_head(attachment) else untrained(carrying) + rig_notes(carrying)
+        notes += rig_notes(attachment.rig) if attachment.off_head else untrained(carrying) + rig_notes(carrying)
     return notes
 
 
