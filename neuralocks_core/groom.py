@@ -103,13 +103,6 @@ class Groom:
         """(P,) int32, the strand that each point belongs to."""
         return np.repeat(np.arange(self.strand_count, dtype=np.int32), self.counts)
 
-    @property
-    def roots(self) -> np.ndarray:
-        """(S, 3) float32 [m], first point of each strand (NaN for a strand without points)."""
-        roots = self.points[np.minimum(self.starts, len(self.points) - 1)].copy()
-        roots[self.counts == 0] = np.nan
-        return roots
-
     def subset(self, strands: np.ndarray) -> Groom:
         """The groom made of the given strands only, in the given order.
 
