@@ -3,12 +3,12 @@
 
 from collections.abc import Callable
 
-from neuralocks_core.models import model_file
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.arguments import flag
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
+from neuralocks_core.models import model_file
 from neuralocks_core.models.shortcomings import shortcomings
 from neuralocks_core.progress import Progress
 

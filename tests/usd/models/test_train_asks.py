@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from neuralocks_core import model
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.models import model_file
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
@@ -57,7 +57,7 @@ def test_all_that_is_asked_for_is_passed_on(tmp_path, made, paper):
     heard = {name: drawn[name] for name in ("progress", "tell")}
     same = {"begin": None, "command": "neuralocks made so", "credits": ("somebody",)}
     assert made.training == ((out, options), {**work, **heard, **same})
-    assert told == [model.read(made.model).shortcomings()]
+    assert told == [model_file.read(made.model).shortcomings()]
 
 
 def test_who_wants_to_hear_nothing_need_not(tmp_path, made):
@@ -82,7 +82,7 @@ def test_unless_it_is_asked_for_no_training_begins_with_a_model_of_another_metho
     """Even if all else is the same."""
     same = {name: getattr(RegressionOptions(), name) for name in ("output", "motion", "strand_map")}
     options = SelfSupervisedOptions(**same)
-    assert begins_with("shipped", False, BoundarySpec(), options) == model.shipped()
+    assert begins_with("shipped", False, BoundarySpec(), options) == model_file.shipped()
     assert begins_with(None, False, BoundarySpec(), options) is None
 
 
