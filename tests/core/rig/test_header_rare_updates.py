@@ -99,7 +99,7 @@ def test_a_turn_by_any_angle_between_two_updates_is_felt_as_that_angle(tmp_path)
         np.testing.assert_allclose(turned[last, :, 4], means(np.interp(t[last] - steps, t, yaw)), atol=3e-5)
 
 
-@pytest.mark.parametrize("spin", [24, 90])
+@pytest.mark.parametrize("spin", [24, 30, 90])
 @pytest.mark.parametrize("bins", [(1, 1, 44), (40, 400)], ids=str)
 def test_a_spin_in_a_long_bin_is_felt_as_it_is(tmp_path, spin, bins):
     """Up to the limit of 25 rad/s, in the direction in which the head turns, by which angle it may ever have turned."""

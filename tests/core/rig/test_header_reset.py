@@ -61,6 +61,13 @@ def test_nothing_is_felt_before_a_push(program):
     assert not run_c(program, rows, COUNT).any()
 
 
+def test_a_head_that_never_moves_feels_nothing(program):
+    """Gravity points down after a reset, whatever was in memory before."""
+    rows = np.tile(moved(1), (100, 1))
+    rows[:, 0], rows[1:, 9] = np.arange(100) / 60, PUSHED
+    assert np.abs(run_c(program, rows, COUNT)).max() < 1e-5
+
+
 def test_after_a_reset_nothing_of_before_is_felt(program):
     """After a few and after many pushes, to the bit if the clock starts again, and as nearly as its doubles allow if it goes on."""
     felt = run_c(program, moved(200, 1), COUNT)
