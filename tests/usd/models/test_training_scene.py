@@ -99,3 +99,23 @@ def test_what_is_no_hair_beside_hair_is_not_learned_from(tmp_path):
     told = []
     assert len(training_scene(shot, tell=told.extend).grooms) == 1
     assert not any("lies" in note for note in told)
+
+
+def test_hair_on_another_skeleton_of_the_same_person_is_their_own(tmp_path):
+    """As where a head and a body have one each."""
+    shot = write_shot(tmp_path, Recipe(bound="mesh"))
+    layer = Sdf.Layer.FindOrOpen(str(shot))
+    Sdf.CopySpec(layer, "/Hero", layer, "/Coat")
+    stage = Usd.Stage.Open(layer)
+    stage.RemovePrim(HAIR)
+    for prim in Usd.PrimRange(stage.GetPrimAtPath("/Coat")):
+        for relation in prim.GetRelationships():
+            relation.SetTargets([each.ReplacePrefix("/Hero", "/Coat") for each in relation.GetTargets()])
+    UsdSkel.BindingAPI.Apply(stage.GetPrimAtPath("/Coat/Hair")).CreateSkeletonRel().SetTargets(["/Coat/Rig"])
+    layer.Save()
+    for skeleton in ("/Hero/Rig", "/Coat/Rig"):
+        assert len(training_scene(shot, skeleton=skeleton).grooms) == 1
+    UsdGeom.XformCommonAPI(stage.GetPrimAtPath("/Coat")).SetTranslate((1, 0, 0))
+    layer.Save()
+    with pytest.raises(NeuralocksError, match="/Coat/Hair: is hair of /Coat/Rig, not of /Hero/Rig; choose its"):
+        training_scene(shot, skeleton="/Hero/Rig")

@@ -157,6 +157,9 @@ def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
     assert card["body"]["penetration_percent"] == pytest.approx(100 * (depth > 2e-6).mean(), abs=0.1)
     assert card["body"]["penetration_worst_mm"] == pytest.approx(1e3 * depth.max(), abs=0.05)
     assert card["body"]["deepest_at"] == codes[deepest[0]] and card["body"]["deepest"] == chain[deepest[1]]
+    monkeypatch.setattr("usd.rig.evaluate.FRAMES", 2)
+    monkeypatch.setattr("usd.rig.evaluate.DEEPEST_FRAMES", 1)
+    assert evaluate_rig(path).measures["body"]["deepest_at"] == card["body"]["deepest_at"], "it is where it seems to be"
     monkeypatch.setattr("usd.rig.evaluate.FRAMES", 7)
     seldom = evaluate_rig(path).measures
     assert seldom["body_frames"] == 7 and seldom["frames"] == FRAMES
