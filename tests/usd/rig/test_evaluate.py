@@ -79,10 +79,13 @@ def test_depths_are_those_of_a_known_body(tmp_path, monkeypatch):
     for deepest in ("penetration_worst_mm", "deepest_at", "deepest"):
         assert few["body"][deepest] == card["body"][deepest], "the deepest frame counts, wherever it is"
     assert few["body"]["penetration_percent"] == pytest.approx(100 * (depth[[0, -1]] > 2e-6).mean(), abs=0.01)
-    looked, seemingly = [], _Posed.seemingly
-    monkeypatch.setattr(_Posed, "seemingly", lambda posed, row, at: looked.append(row) or seemingly(posed, row, at))
+    looked, measured, of = [], [], _Posed
+    seemingly, distances = of.seemingly, of.distances
+    monkeypatch.setattr(of, "seemingly", lambda posed, row, at: looked.append(row) or seemingly(posed, row, at))
+    monkeypatch.setattr(of, "distances", lambda posed, row, at: measured.append(row) or distances(posed, row, at))
     monkeypatch.setattr("usd.rig.evaluate.LOOKED_AT", 4)
-    assert evaluate_rig(baked).measures["body_frames"] == 2 and looked == [7, 14, 21]
+    monkeypatch.setattr("usd.rig.evaluate.DEEPEST_FRAMES", 1)
+    assert evaluate_rig(baked).measures["body_frames"] == 2 and looked == [7, 14, 21] and len(measured) == 3
     assert card["body_frames"] == 25
     assert card["body"]["penetration_worst_mm"] == pytest.approx(1e3 * depth.max(), abs=0.01)
     assert card["body"]["penetration_percent"] == pytest.approx(100 * (depth > 2e-6).mean(), abs=0.01)
@@ -226,12 +229,12 @@ def test_of_several_characters_the_baked_one_is_measured_and_others_are_told(tmp
 
 @pytest.mark.parametrize(("code", "told"), [(52, False), (53, True)])
 def test_a_held_pose_rests(tmp_path, code, told):
-    """The head stands still from frame 5 on: quasi-static hair does, too, and trembling two seconds later is reported."""
+    """The head stands still from frame 5 to 96: quasi-static hair does, too, and trembling two seconds later is reported."""
     shot = small_shot(tmp_path / "shot.usda", frames=96)
     stage = Usd.Stage.Open(str(shot))
     turns = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
-    for later in range(6, 98):
-        turns.Set(turns.Get(5), later)
+    for later in range(6, 97):
+        turns.Set(turns.Get(5), later)  # in the last frame it moves again
     stage.GetRootLayer().Save()
     baked = bake_rig(shot, tmp_path / "baked.usda", model_for(read_rigged_hair(shot))).path
     assert evaluate_rig(baked).measures["jitter_mm"] == 0
