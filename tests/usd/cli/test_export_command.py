@@ -2,9 +2,14 @@
 """`neuralocks export`: a model as plain ONNX files, whole or not at all."""
 
 import json
+import signal
+from contextlib import suppress
 from pathlib import Path
 
-from neuralocks_core.models import model_file
+from pxr import Usd, UsdSkel
+
+from neuralocks_core import model as model_file
+from usd.border.stopping import INTERRUPTED
 
 from ..commands import status
 from ..shots import write_shot
@@ -96,7 +101,36 @@ def test_nor_is_what_lies_beside_an_earlier_export(tmp_path, model, capsys):
     assert {path: path.read_bytes() for path in out.iterdir()} == before
     mine.unlink()
     for _ in range(2):
+        capsys.readouterr()
         assert status("export", model, "-o", out, "--shot", shot) == 0
+        assert sorted(capsys.readouterr().out.split()) == sorted(map(str, out.iterdir())) and mine.exists()
+
+
+def test_who_stops_while_the_last_file_is_written_gets_none(tmp_path, model, monkeypatch):
+    def swallowed(text):
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        return text
+
+    monkeypatch.setattr("usd.models.export.readable", swallowed)
+    monkeypatch.setattr("usd.models.export.plain", str)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job is deaf to it
+    try:
+        assert status("export", model, "-o", tmp_path / "out") == INTERRUPTED
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert not list(tmp_path.iterdir())
+
+
+def test_grooms_of_a_shot_without_animation_are_exported(tmp_path, model):
+    """An engine may have motion of its own."""
+    shot, out = write_shot(tmp_path), tmp_path / "out"
+    stage = Usd.Stage.Open(str(shot))
+    for prim in stage.Traverse():
+        if prim.IsA(UsdSkel.Animation):
+            prim.SetActive(False)
+    stage.Save()
+    assert status("export", model, "-o", out, "--shot", shot) == 0 and (out / "Hero_Hair.npz").exists()
 
 
 def test_a_description_of_something_else_is_not_written_over(tmp_path, capsys):
