@@ -9,13 +9,18 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from neuralocks_core.boundary.spec import BoundarySpec
-from neuralocks_core.models import model_file
+from neuralocks_core import model as model_file
+from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.deformation.clumping import CANTILEVER, Locks
+from neuralocks_core.materials import Material
+from neuralocks_core.motion import G
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_vector
+from neuralocks_core.stepped import LONGEST
 from neuralocks_core.wind import Wind
 from tests.strand_models import write_random_model
+from usd.models.description import SLIDERS
 from usd.models.export import export_model
 from usd.skel.clip_codes import CLOSE, STAND
 
@@ -54,6 +59,8 @@ def test_the_history_told_is_that_of_the_model(tmp_path, linear, chest, told):
     assert f"is {told}, three numbers each" in history
     assert all((f"{step} =" in history) == (step in told) for step in ("f_k", "v_k", "s_k"))
     assert ("the same for the upper chest" in history) == chest
+    assert ("the change is shortened to that length" in history) == (linear == "gravity")
+    assert 1 / int(re.search(r"longer than 1/(\d+) s is a stop", history)[1]) == pytest.approx(LONGEST, abs=2e-3)
 
 
 @pytest.mark.parametrize(("kind", "entry"), [("strands", "boundary vector"), ("rig", "features")])
@@ -84,6 +91,7 @@ def test_what_makes_hair_start_anew_is_told_of_rigs_too(tmp_path):
         and "Clear the samples at a cut" in how["a game"]
         and "weight" not in how["a game"]
     )
+    assert "Motion strength is a factor" in how["history"] and how["wind"].startswith("add the binned steps")
     export_model(QUASI_STATIC, tmp_path)
     how = json.loads((tmp_path / "description.json").read_text("utf-8"))["features"]["how"]
     assert not {"a cut", "a game", "history", "clip", "wind"} & set(how)
@@ -124,7 +132,26 @@ def test_the_winds_of_a_bake_are_described_for_others(tmp_path, mean, period):
         side = {"+X": np.array([1.0, 0.0, 0.0])}[re.search(r"or (\S+) if m is vertical", told)[1]]
     s = share * np.linalg.norm(m) * side / np.linalg.norm(side)
     assert m + 0.7 * (a * m + b * s) == pytest.approx(wind.at(t[:, 0], period), abs=1e-9)
-    for static in (BoundarySpec(bins=()), BoundarySpec(linear="velocity")):
-        path = write_random_model(tmp_path / "held.neuralocks", gain=1.0, spec=static)
-        export_model(path, tmp_path / "held")
-        assert "wind" not in json.loads((tmp_path / "held" / "description.json").read_text("utf-8"))["sliders"]
+    for spec, static in ((BoundarySpec(bins=()), True), (BoundarySpec(linear="velocity"), False), (None, True)):
+        file = model_file.read(write_random_model(tmp_path / "held.neuralocks", gain=1.0, spec=spec))
+        model_file.write(file.path, file.meta | {"static": static}, file.graphs)
+        export_model(file.path, tmp_path / "held")
+        sliders = json.loads((tmp_path / "held" / "description.json").read_text("utf-8"))["sliders"]
+        assert set(sliders) == {*SLIDERS} - {"wind"}
+
+
+def test_clumping_is_described_as_a_bake_has_it():
+    told = re.search(
+        r"f = \(k0 \+ (\S+) tie\) / \(k0 \+ 2 clumping tie\), k0 = (\S+) bend / length\^4 \+ (\S+) weight / length;",
+        SLIDERS["clumping"],
+    )
+    usual, rod, pendulum = map(float, told.groups())
+    length, tie, none = np.array([0.1, 0.3, 0.9]), np.array([0.0, 0.5, 1.2]), np.zeros(3)
+    locks = Locks(none, none, none, rod / length**4, pendulum / length, tie)
+    for own in (Material(), Material(bend=0.005, weight=2.0, clumping=200.0), Material(clumping=0.0)):
+        held = rod * own.bend / length**4 + pendulum * own.weight / length
+        wanted = (held + usual * tie) / (held + 2 * own.clumping * tie)
+        ratios = own.log_ratios()
+        ratios[0] -= ratios[1]  # a boundary vector has bend / weight
+        np.testing.assert_allclose(locks.spread(ratios), wanted, rtol=1e-4)
+    assert (rod, pendulum) == (CANTILEVER, G)

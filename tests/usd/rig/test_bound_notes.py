@@ -81,3 +81,11 @@ def test_where_a_model_does_not_fit_another_head_than_in_training_is_told(edited
             bake_rig(shot, tmp_path / "out.usda", other)
         said = "; but in training the head was 'kopf', and here it is 'head': check --head first"
         assert str(caught.value).endswith(said) == told, caught.value
+
+
+@pytest.mark.parametrize(("trained", "told"), [("hair_3", True), ("gone", False), ("head", False)])
+def test_only_a_joint_that_is_here_may_be_meant_in_place_of_the_one_read(tmp_path, model, trained, told):
+    other = replace(model, training={"reads": {"neck": trained}})
+    notes = bake_rig(tmp_path / "trained.usda", tmp_path / "out.usda", other).notes
+    said = "/Who/Rig: 'head' is read as neck, but in training 'hair_3' was, which is here, too"
+    assert any(note.startswith(said) for note in notes) == told == any("is read as" in note for note in notes)

@@ -78,14 +78,16 @@ def test_depths_are_those_of_a_known_body(tmp_path, monkeypatch):
     assert few["body_frames"] == 2 and few["body"]["deepest_at"] not in (CODES[0], CODES[-1])
     for deepest in ("penetration_worst_mm", "deepest_at", "deepest"):
         assert few["body"][deepest] == card["body"][deepest], "the deepest frame counts, wherever it is"
-    assert few["body"]["penetration_percent"] == pytest.approx(100 * (depth[[0, -1]] > 2e-6).mean(), abs=0.01)
     looked, measured, of = [], [], _Posed
     seemingly, distances = of.seemingly, of.distances
     monkeypatch.setattr(of, "seemingly", lambda posed, row, at: looked.append(row) or seemingly(posed, row, at))
     monkeypatch.setattr(of, "distances", lambda posed, row, at: measured.append(row) or distances(posed, row, at))
     monkeypatch.setattr("usd.rig.evaluate.LOOKED_AT", 4)
     monkeypatch.setattr("usd.rig.evaluate.DEEPEST_FRAMES", 1)
-    assert evaluate_rig(baked).measures["body_frames"] == 2 and looked == [7, 14, 21] and len(measured) == 3
+    said = []
+    assert evaluate_rig(baked, progress=lambda *words: said.append(words)).measures["body_frames"] == 2
+    assert looked == [7, 14, 21] and len(measured) == 3
+    assert said[25:] == [(done + 1, 3, "measuring distances to the body") for done in range(3)]
     assert card["body_frames"] == 25
     assert card["body"]["penetration_worst_mm"] == pytest.approx(1e3 * depth.max(), abs=0.01)
     assert card["body"]["penetration_percent"] == pytest.approx(100 * (depth > 2e-6).mean(), abs=0.01)
@@ -166,6 +168,8 @@ def test_chains_and_depths_are_those_of_an_animated_rig(tmp_path, monkeypatch):
     monkeypatch.setattr("usd.rig.evaluate.FRAMES", 7)
     seldom = evaluate_rig(path).measures
     assert seldom["body_frames"] == 7 and seldom["frames"] == FRAMES
+    spread = depth[np.linspace(0, FRAMES - 1, 7).round().astype(int)]
+    assert seldom["body"]["penetration_percent"] == pytest.approx(100 * (spread > 2e-6).mean(), abs=0.1)
     at = depth[codes.index(seldom["body"]["deepest_at"])]
     assert seldom["body"]["penetration_worst_mm"] == pytest.approx(1e3 * at.max(), abs=0.05)
     monkeypatch.setattr("usd.rig.evaluate.VERTICES", len(chain) // 3)
