@@ -46,6 +46,12 @@ def test_hair_that_hangs_beside_the_head_is_told(edited, tmp_path, above, lock, 
         assert [note for note in notes if " not moved; " in note] == ([f"/Who/Rig: {told}"] if told else [])
 
 
+def test_of_several_joints_beside_the_head_one_is_named(edited):
+    shot = edited(_named("hips", "hips/head", "hips/pony", "hips/pony_2", "hips/head/hair_0", "hips/head/hair_0/end"))
+    (note,) = [note for note in rigged_notes(read_rigged_hair(shot).source) if "not moved" in note]
+    assert note == "/Who/Rig: 'pony' and 1 more hang from 'hips' and are not moved; parent them to the head in the rig"
+
+
 def test_hair_below_a_copy_of_the_head_is_moved(edited):
     """As in a control rig, where the copy is often named like a head, too: it is no second head."""
 
@@ -86,30 +92,39 @@ def test_a_joint_beside_the_head_that_moves_nothing_is_not_told(edited):
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("names", "drives", "told"),
     [
-        ("cable", "'cable_0' is not moved; if it is hair, name all that is to move with --chains"),
-        ("ear", None),
+        (
+            ["cable"],
+            [4, 6, 7, 8, 7, 8],
+            "'cable_0' is not moved; if it is hair, name all that is to move with --chains",
+        ),
+        (
+            ["cable", "rope"],
+            [6, 7, 8, 9, 10, 11],
+            "'cable_0' and 1 more are not moved; if they are hair, name all that",
+        ),
+        (["ear"], [4, 6, 7, 8, 7, 8], None),
     ],
 )
-def test_chains_of_other_names_beside_those_found_are_told(edited, name, told):
+def test_chains_of_other_names_beside_those_found_are_told(edited, names, drives, told):
     """In a mesh that the body also drives, only names show which joints are hair; joints in rows of three may be."""
     head = "hips/head"
 
     def change(stage):
         rig = stage.GetPrimAtPath("/Who/Rig")
-        more = [f"{head}/{name}_0", f"{head}/{name}_0/{name}_1", f"{head}/{name}_0/{name}_1/{name}_2"]
-        rig.GetAttribute("joints").Set([*rig.GetAttribute("joints").Get(), *more])
         for attribute in (rig.GetAttribute("bindTransforms"), rig.GetAttribute("restTransforms")):
-            attribute.Set(Vt.Matrix4dArray([*attribute.Get(), *list(attribute.Get())[2:5]]))
-        indices = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar()
-        indices.Set([0, 2, 3, 4, 6, 7, 8, 7, 8])
+            attribute.Set(Vt.Matrix4dArray([*attribute.Get(), *list(attribute.Get())[2:5] * len(names)]))
+        more = [f"{n}_0/{n}_1/{n}_2".split("/")[: k + 1] for n in names for k in range(3)]
+        rig.GetAttribute("joints").Set([*rig.GetAttribute("joints").Get(), *("/".join([head, *way]) for way in more)])
+        UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set([0, 2, 3, *drives])
 
     shot = edited(change)
     hair = read_rigged_hair(shot)
-    expected = [f"/Who/Rig: {told}"] if told else []
-    assert chain_notes(hair, None) == expected and chain_notes(hair, ["hair_0"]) == []
-    assert [note for note in inspect(shot)["spoils"] if " not moved; " in note] == expected
+    found = chain_notes(hair, None)
+    assert [note.startswith(f"/Who/Rig: {told}") for note in found] == [True] * bool(told)
+    assert chain_notes(hair, ["hair_0"]) == []
+    assert [note for note in inspect(shot)["spoils"] if " not moved; " in note] == found
 
 
 def with_strands(shot):
