@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
+from neuralocks_core.model import shipped
 from neuralocks_core.rig import RigModel, rig_spec
 from usd.models.train import train
 from usd.rig.beginning import Beginning
@@ -85,6 +86,7 @@ def test_a_model_that_cannot_be_trained_on_is_refused(tmp_path):
             {"begin": still},
             "quasi_static.neuralocks: it is quasi-static; train with --quasi-static, or begin with another",
         ),
+        ({"begin": shipped("rig"), "dynamic": False}, "rig.neuralocks: it is dynamic; train with --dynamic, or begin"),
         (
             {"begin": still, "dynamic": False, "hidden": 8},
             "--hidden: the model of --begin has layers of 16; leave one of",
@@ -101,7 +103,7 @@ def test_a_model_that_cannot_be_trained_on_is_refused(tmp_path):
     assert not out.exists()
 
 
-def test_a_model_of_another_network_or_other_chains_is_refused(tmp_path):
+def test_a_model_of_another_network_or_other_chains_is_refused(tmp_path, monkeypatch):
     """What would otherwise begin with wrong weights."""
     still, model = RigModel.load(EXAMPLE / "quasi_static.neuralocks"), tmp_path / "m.neuralocks"
     replace(still, max_angle=2.0).save(model)
@@ -113,6 +115,23 @@ def test_a_model_of_another_network_or_other_chains_is_refused(tmp_path):
     said = f"its {len(some)} joints are not the {len(still.chains)} of this rig in the same order; "
     with pytest.raises(NeuralocksError, match=said + r"name its chains as in its training \(--chains hair_nape_l_1\)"):
         Beginning(model, False, None).check(still.chains)
+    tops = still.chains.tops[:5]
+    random_rig_model(read_rigged_hair(EXAMPLE / "character.usda", chains=[*tops]).rig.chains, rig_spec(), 16, 0).save(
+        model
+    )
+    for few, named in ((4, "".join(f"--chains {top} " for top in tops[:4]) + "..."), (5, f"--chains {tops[4]}")):
+        monkeypatch.setattr("usd.rig.beginning._FEW", few)
+        with pytest.raises(
+            NeuralocksError, match=rf"name its chains as in its training \(.*{named}\), or train without"
+        ):
+            Beginning(model, False, None).check(still.chains)
+
+
+def test_a_model_that_tells_no_material_has_none(tmp_path):
+    still, model = RigModel.load(EXAMPLE / "quasi_static.neuralocks"), tmp_path / "m.neuralocks"
+    for training in ({}, {"material": "soft"}, {"material": {"colour": 1.0}}):
+        replace(still, training=training).save(model)
+        assert Beginning(model, False, None).material() == {}
 
 
 def test_a_card_says_what_training_began_with(tmp_path, monkeypatch):
