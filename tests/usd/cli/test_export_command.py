@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pxr import Usd, UsdSkel
 
-from neuralocks_core import model as model_file
+from neuralocks_core.models import model_file
 from usd.border.stopping import INTERRUPTED
 
 from ..commands import status

@@ -9,15 +9,15 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from neuralocks_core import model as model_file
-from neuralocks_core.boundary_spec import BoundarySpec
+from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.boundary.stepped import LONGEST
 from neuralocks_core.deformation.clumping import CANTILEVER, Locks
 from neuralocks_core.materials import Material
+from neuralocks_core.models import model_file
 from neuralocks_core.motion import G
 from neuralocks_core.rig import RigModel
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rotation import from_vector
-from neuralocks_core.stepped import LONGEST
 from neuralocks_core.wind import Wind
 from tests.strand_models import write_random_model
 from usd.models.description import SLIDERS

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.model import shipped
+from neuralocks_core.models.model_file import shipped
 from neuralocks_core.rig import RigModel, rig_spec
 from usd.models.train import train
 from usd.rig.beginning import Beginning
