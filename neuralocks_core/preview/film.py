@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,7 +61,6 @@ class Scene:
         body: frame number -> body points (V, 3) [m], world, or None.
         body_rest: body points in bind pose (V, 3) [m], or None.
         mesh_hair: vertices of the body that are hair (V,) bool, or None.
-        look: colours.
         cuts: times of the first frame after each cut (C,) [s]: no camera flies from one place to the other.
         size: how many times a person's size the character is.
         collar: heights in bind pose [m] between which clothes begin, lower first, such as shoulders and neck, and how far aside
@@ -79,7 +78,6 @@ class Scene:
     body: Callable[[int], np.ndarray] | None = None
     body_rest: np.ndarray | None = None
     mesh_hair: np.ndarray | None = None
-    look: shading.Look = field(default_factory=shading.Look)
     cuts: np.ndarray = ()
     size: float = 1.0
     collar: tuple[float, float, float] | None = None
@@ -157,10 +155,9 @@ class Film:
         scene, head = self.scene, self.scene.head[frame]
         own = self._own(scene.hair(frame))
         centre = head[:3, :3] @ scene.centre + head[:3, 3]
-        counts = np.full(len(own), self.detail.vertices)
-        tint, shadow = shading.hair_colours(own.reshape(-1, 3), counts, to_eye, centre, lights, scene.look)
+        tint, shadow = shading.hair_colours(own, to_eye, centre, lights)
         hair = np.repeat(own, self._copies, axis=0) + self._beside @ head[:3, :3].T
-        tint = np.repeat(tint.reshape(own.shape), self._copies, axis=0) * self._tone
+        tint = np.repeat(tint, self._copies, axis=0) * self._tone
         return hair.reshape(-1, 3), shading.srgb(tint.reshape(-1, 3)), shadow
 
     def close(self) -> None:
@@ -205,7 +202,7 @@ class Film:
             aside = np.abs((scene.body_rest - scene.centre) @ scene.facing[0])
             below = np.where(height < neck, np.maximum(below, aside - SLEEVES * apart), below)  # a head may be wider
         cloth = np.clip(below / 0.03, 0, 1)[:, None]
-        result = (1 - cloth) * np.array(scene.look.skin) + cloth * np.array(scene.look.cloth)
+        result = (1 - cloth) * shading.SKIN + cloth * shading.CLOTH
         if scene.mesh_hair is not None:
             result[scene.mesh_hair] = self._locks()[scene.mesh_hair]
         return result
@@ -218,7 +215,7 @@ class Film:
         light = 0.3 + 0.7 * ((far - near) / max(farthest - near, 1e-6))[:, None].clip(0, 1)
         piece = welded_pieces(scene.body_rest, scene.triangles[scene.mesh_hair[scene.triangles].all(axis=1)])
         tone = np.exp(np.random.default_rng(5).normal(0, LOCK_TONE, piece.max() + 1))[piece, None]
-        return tone * ((1 - light) * np.array(scene.look.root) + light * np.array(scene.look.tip))
+        return tone * ((1 - light) * shading.ROOT + light * shading.TIP)
 
     def _follow(self, shape: float) -> None:
         """Where cameras look, how far away they are, and where the face looks on average between cuts. Cameras go along with the

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Colours for hair and body in a preview: light along the tangent, and shadow by the amount of hair in front."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+ROOT, TIP, GLOSS = np.array([(0.040, 0.016, 0.008), (0.170, 0.068, 0.027), (0.62, 0.50, 0.40)])
+"""Colours of hair, linear RGB: at the root, at the tip, of its highlights."""
+SKIN, CLOTH = np.array([(0.56, 0.40, 0.33), (0.055, 0.075, 0.10)])
+"""Colours of the body, linear RGB."""
 KEY = np.array([0.55, 0.75, 0.65]) / np.linalg.norm([0.55, 0.75, 0.65])
 FILL = np.array([-0.8, 0.25, 0.6]) / np.linalg.norm([-0.8, 0.25, 0.6])
 RIM = np.array([-0.35, 0.55, -0.9]) / np.linalg.norm([-0.35, 0.55, -0.9])
@@ -19,35 +21,22 @@ COVER = 2.2
 """Width of all strands side by side [m]: determines how much light is dimmed, for any number of drawn strands."""
 
 
-@dataclass(frozen=True)
-class Look:
-    """Colours, linear RGB."""
-
-    root: tuple[float, float, float] = (0.040, 0.016, 0.008)
-    tip: tuple[float, float, float] = (0.170, 0.068, 0.027)
-    gloss: tuple[float, float, float] = (0.62, 0.50, 0.40)
-    skin: tuple[float, float, float] = (0.56, 0.40, 0.33)
-    cloth: tuple[float, float, float] = (0.055, 0.075, 0.10)
-
-
 def hair_colours(
-    points: np.ndarray, counts: np.ndarray, to_eye: np.ndarray, centre: np.ndarray, axes: np.ndarray, look: Look
+    hair: np.ndarray, to_eye: np.ndarray, centre: np.ndarray, axes: np.ndarray
 ) -> tuple[np.ndarray, "ShadowMap"]:
-    """Linear colours (P, 3) of strand vertices, and the shadow that the hair casts.
+    """Linear colours (S, N, 3) of strand vertices, and the shadow that the hair casts.
 
     Diffuse light and two highlights along the tangent (Kajiya and Kay 1989; the second one shifted and tinted as in
     Marschner et al. 2003), dimmed by the hair in front.
 
     Args:
-        points: (P, 3) [m] world, all strands with the same number of vertices.
-        counts: vertices of each strand (S,), all equal.
+        hair: strands (S, N, 3) [m], world.
         to_eye: unit vector towards the camera (3,).
         centre: middle of the head (3,) [m].
         axes: light axes, columns right, up, front (3, 3).
-        look: colours.
     """
-    strands, vertices = len(counts), int(counts[0])
-    x = (points - centre).astype(np.float32).reshape(strands, vertices, 3)
+    (strands, vertices, _), points = hair.shape, hair.reshape(-1, 3)
+    x = (hair - centre).astype(np.float32)
     tangent = _unit(np.gradient(x, axis=1))
     outward = x.copy()
     outward -= np.einsum("snc,snc->sn", outward, tangent)[..., None] * tangent
@@ -58,9 +47,9 @@ def hair_colours(
 
     rng = np.random.default_rng(7)
     down = np.linspace(0, 1, vertices)[None, :, None] ** 1.3
-    base = (np.array(look.root) * (1 - down) + np.array(look.tip) * down).astype(np.float32)
+    base = (ROOT * (1 - down) + TIP * down).astype(np.float32)
     shift = rng.normal(0, 0.05, (strands, 1)).astype(np.float32)
-    gloss = 0.5 * np.array(look.gloss, np.float32)
+    gloss = 0.5 * GLOSS.astype(np.float32)
     light = np.zeros(x.shape, np.float32)
     for direction, power, dim in ((KEY, 2.6, 1.0), (FILL, 0.55, 0.6), (RIM, 2.2, 1.0)):
         towards = (axes @ direction).astype(np.float32)
@@ -76,7 +65,7 @@ def hair_colours(
         light += power * clear * (base * (diffuse + tinted) + wrap * bright * gloss)
     sky = np.exp(-0.5 * shadow.depth(points, axes @ np.array([0, 0.8, 0.6]))).reshape(strands, vertices, 1)
     light += 0.30 * _smoothed(sky) * base
-    return light.reshape(-1, 3), shadow
+    return light, shadow
 
 
 def body_colours(

@@ -204,7 +204,7 @@ def test_clothes_begin_between_shoulders_and_neck(collar, begins, size):
     who = replace(scene(), size=size, centre=size * CENTRE, body_rest=size * skin, triangles=np.zeros((0, 3), int))
     who = replace(who, rest=size * who.rest, collar=collar and tuple(size * each for each in collar))
     with closing(Film(who, 44, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
-        bare = np.isclose(film._albedo, who.look.skin).all(axis=1)
+        bare = np.isclose(film._albedo, shading.SKIN).all(axis=1)
     assert skin[bare, 1].min() == pytest.approx(begins, abs=0.002) and not bare[-1]
 
 
@@ -219,7 +219,7 @@ def test_arms_of_a_t_pose_have_sleeves(degrees):
     body = {"body_rest": np.concatenate([arms, head]), "triangles": np.zeros((0, 3), int)}
     who = replace(scene(), facing=facing, collar=(1.2, 1.4, 0.2), **body)
     with closing(Film(who, 44, 62, SMALL, 0.02, plain_canvas.PlainCanvas)) as film:
-        bare = np.isclose(film._albedo, who.look.skin).all(axis=1)
+        bare = np.isclose(film._albedo, shading.SKIN).all(axis=1)
     assert bare[len(arms) :].all()
     assert np.abs((arms - CENTRE) @ aside)[bare[: len(arms)]].max() == pytest.approx(0.34, abs=0.005)
 
