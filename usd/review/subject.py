@@ -51,7 +51,6 @@ class Subject:
         self.chosen = every.whole_locks(STRANDS, seed=int("solver" in recorded(item.prim)))
         self.strands: StrandSet = every.subset(self.chosen)
         self.begun = begun.subset(self.chosen)
-        self.valid = int(every.valid.sum())
         arc, length = arc_lengths(groom)
         self._within(groom, arc, length)
         rest = self.character.canonical(groom.points.astype(float))

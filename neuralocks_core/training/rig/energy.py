@@ -33,7 +33,7 @@ class RigEnergy(torch.nn.Module):
     def __init__(self, rig: HairRig, material: RigMaterial, dtype=torch.float32):
         super().__init__()
         chains = rig.chains
-        self.chains, self.material = chains, material
+        self.material = material
         tree = RodTree(chains, material)
         chosen = np.linspace(0, len(rig.points) - 1, min(COLLIDING, len(rig.points))).astype(int)
         self.chosen = chosen
