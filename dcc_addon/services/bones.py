@@ -52,7 +52,7 @@ def _meshes(character: Character) -> list[SkinnedMesh] | None:
     body = character.body
     if body is None:
         return None
-    return [SkinnedMesh("body", body.points, body.triangles, body.joint_indices, body.joint_weights)]
+    return [SkinnedMesh(body.points, body.triangles, body.joint_indices, body.joint_weights)]
 
 
 @dataclass(eq=False)

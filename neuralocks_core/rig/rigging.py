@@ -28,14 +28,12 @@ class HairRig:
         chains: the hair joints.
         points: vertices that the hair joints move, canonical bind pose, (V, 3) [m].
         weights: on the head and on each hair joint, (V, 1 + N).
-        triangles: of the hair, (F, 3) int into `points`.
     """
 
     character: Character
     chains: HairChains
     points: np.ndarray
     weights: np.ndarray
-    triangles: np.ndarray
 
     def with_body(self, body: Body | None) -> "HairRig":
         """The same hair with another body, the holes of whose head are closed, or with none if that is out of its reach."""
@@ -65,8 +63,7 @@ def assemble_rig(
     skeleton = character.skeleton
     count = len(skeleton.names)
     moving = moving_joints(skeleton, chains)
-    body_triangles, points, weights, triangles = [], [], [], []
-    start, taken = 0, 0
+    body_triangles, points, weights, start = [], [], [], 0
     for mesh, (body, moved) in zip(meshes, parted(character, meshes, moving)):
         body_triangles.append(body + start)
         start += len(mesh.points)
@@ -76,9 +73,6 @@ def assemble_rig(
         weights.append(
             skin_weights(chains, count, skeleton.parents, mesh.joint_indices[moved], mesh.joint_weights[moved])
         )
-        place = np.cumsum(moved) - 1 + taken
-        triangles.append(place[mesh.triangles[moved[mesh.triangles].all(axis=1)]])
-        taken += int(moved.sum())
     body = character.body
     if body is not None:
         faces = np.concatenate(body_triangles) if body_triangles else np.zeros((0, 3), int)
@@ -88,7 +82,6 @@ def assemble_rig(
         chains,
         np.concatenate(points) if points else np.zeros((0, 3)),
         np.concatenate(weights) if weights else np.zeros((0, len(chains) + 1)),
-        np.concatenate(triangles) if triangles else np.zeros((0, 3), int),
     )
     return rig.with_body(body)
 

@@ -14,14 +14,12 @@ class SkinnedMesh:
     """One skinned mesh of a rig.
 
     Attributes:
-        name: for messages.
         points: bind pose, world space, (V, 3) [m].
         triangles: (F, 3) int.
         joint_indices: indices in the skeleton, (V, I) int.
         joint_weights: (V, I), each row sums to one.
     """
 
-    name: str
     points: np.ndarray
     triangles: np.ndarray
     joint_indices: np.ndarray

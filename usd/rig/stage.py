@@ -222,10 +222,7 @@ def is_baked(source: StageRig) -> bool:
 
 def core_meshes(source: StageRig) -> list[SkinnedMesh]:
     """The skinned meshes of a skeleton in the core's axes and metres, in the order of the merged body."""
-    return [
-        SkinnedMesh(str(mesh.prim.GetPath()), *mesh.in_bind(source.to_bind), mesh.indices, mesh.weights)
-        for mesh in source.meshes
-    ]
+    return [SkinnedMesh(*mesh.in_bind(source.to_bind), mesh.indices, mesh.weights) for mesh in source.meshes]
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:

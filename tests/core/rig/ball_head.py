@@ -27,4 +27,4 @@ def on_a_ball() -> HairRig:
     along = chains.origins[:, None] + chains.bones[:, None] * np.linspace(0.1, 0.9, 5)[:, None]
     points = np.concatenate([along + (side, 0, 0) for side in (-0.03, 0.0, 0.03)], axis=1)
     weights = np.repeat(np.eye(len(chains), len(chains) + 1, 1), points.shape[1], axis=0)
-    return HairRig(who, chains, points.reshape(-1, 3), weights, np.zeros((0, 3), int))
+    return HairRig(who, chains, points.reshape(-1, 3), weights)

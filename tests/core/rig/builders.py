@@ -53,9 +53,7 @@ def branched() -> HairRig:
     chains = find_chains(who)
     rng = np.random.default_rng(0)
     weights = rng.random((7, len(chains) + 1))
-    return HairRig(
-        who, chains, rng.normal(0, 0.1, (7, 3)), weights / weights.sum(1, keepdims=True), np.zeros((0, 3), int)
-    )
+    return HairRig(who, chains, rng.normal(0, 0.1, (7, 3)), weights / weights.sum(1, keepdims=True))
 
 
 def with_balls(fine: int = 3) -> tuple[HairRig, float]:
@@ -78,7 +76,7 @@ def skin(who: Character, joints: dict[str, tuple]) -> SkinnedMesh:
     points = np.concatenate([np.asarray(p, float).reshape(3, 3) for p in joints.values()])
     indices = np.repeat([leaves.index(name) for name in joints], 3)[:, None]
     triangles = np.arange(len(points)).reshape(-1, 3)
-    return SkinnedMesh("mesh", points, triangles, indices, np.ones_like(indices, float))
+    return SkinnedMesh(points, triangles, indices, np.ones_like(indices, float))
 
 
 def steered(leaf, next_leaf=True):

@@ -151,8 +151,8 @@ def assembled(rig: HairRig, body: Body, joint: int) -> HairRig:
     ribbon = rig.points + who.skeleton.bind[who.head, :3, 3]
     on = rig.chains.joints[rig.weights[:, 1:].argmax(axis=1)][:, None]
     meshes = [
-        SkinnedMesh("body", body.points, body.triangles, joints, np.ones_like(joints, float)),
-        SkinnedMesh("hair", ribbon, np.arange(len(ribbon)).reshape(-1, 3), on, np.ones((len(ribbon), 1))),
+        SkinnedMesh(body.points, body.triangles, joints, np.ones_like(joints, float)),
+        SkinnedMesh(ribbon, np.arange(len(ribbon)).reshape(-1, 3), on, np.ones((len(ribbon), 1))),
     ]
     both = Body(
         np.concatenate([body.points, ribbon]),

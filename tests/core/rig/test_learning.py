@@ -33,7 +33,7 @@ def bare(rows) -> HairRig:
     """Chains without a mesh."""
     who = character(rows)
     chains = find_chains(who)
-    return HairRig(who, chains, np.zeros((0, 3)), np.zeros((0, 1 + len(chains))), np.zeros((0, 3), int))
+    return HairRig(who, chains, np.zeros((0, 3)), np.zeros((0, 1 + len(chains))))
 
 
 @pytest.mark.parametrize("support", [True, False])

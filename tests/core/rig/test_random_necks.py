@@ -29,7 +29,7 @@ def rig(request) -> HairRig:
     bind[[name.endswith("lower_arm") for name in made.names], 1, 3] -= 0.1
     who = Character(Skeleton(made.names, made.parents, whole @ bind))
     chains = find_chains(who)
-    return HairRig(who, chains, np.zeros((0, 3)), np.zeros((0, 1 + len(chains))), np.zeros((0, 3), int))
+    return HairRig(who, chains, np.zeros((0, 3)), np.zeros((0, 1 + len(chains))))
 
 
 def joint(rig: HairRig, name: str) -> int:

@@ -126,7 +126,7 @@ def test_a_teleport_and_other_frame_rates():
     """Spring bones are flung and depend on the rate; a function of held poses knows neither."""
     model = random_model(spec=rig_spec())
     who = character([row for c in range(4) for row in tail(f"hair_{c}", 5, at=(0.1 * np.cos(c), 1.6, 0.1 * np.sin(c)))])
-    rig = HairRig(who, model.chains, np.zeros((0, 3)), np.zeros((0, 17)), np.zeros((0, 3), int))
+    rig = HairRig(who, model.chains, np.zeros((0, 3)), np.zeros((0, 17)))
     report = motion_report(rig, RigMaterial(), {"network": model}, kinds=("turn",))
     assert report["teleport"]["network"] == {"flung_mm": 0.0, "seconds": 0.0}
     assert report["teleport"][SPRINGS]["flung_mm"] > 20 and report["teleport"][SPRINGS]["seconds"] > 0.1
