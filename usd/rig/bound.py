@@ -182,7 +182,7 @@ def _likelier(hair: RiggedHair, model: RigModel) -> list[str]:
     source, reads = hair.source, model.training.get("reads")
     trained = reads.get("head") if isinstance(reads, dict) else None
     head = leaf(source.source.names[source.character.head])
-    if isinstance(trained, str) and trained != head and trained in map(leaf, source.source.names):
+    if trained != head and trained in map(leaf, source.source.names):
         return [f"but in training the head was '{trained}', and here it is '{head}': check --head first"]
     return [f"but first: {note}" for note in lies_down(source)]
 
