@@ -45,6 +45,8 @@ def test_joints_hold_with_each_pose_and_a_bake_tells_it(tmp_path):
     model = model_for(read_rigged_hair(shot), dynamic=True)
     done = bake_rig(shot, tmp_path / "bake.usda", model)
     assert [note for note in done.notes if note.endswith(NOTE)] == [f"/Who/Rig: {NOTE}"]
+    still = bake_rig(shot, tmp_path / "still.usda", model_for(read_rigged_hair(shot)))
+    assert not any(note.endswith(NOTE) for note in still.notes), "hair of held poses holds with them anyway"
     stage = Usd.Stage.Open(str(done.path))
     animation = UsdSkel.Animation(stage.GetPrimAtPath(done.rigs[0].animation))
     for code in range(1, 25, 2):

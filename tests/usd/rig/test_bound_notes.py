@@ -18,11 +18,8 @@ CODES = [1, 7, 20]
 
 @pytest.fixture
 def model(tmp_path):
-    """A model for the plain small shot, of which `plain.usda` is a bake."""
-    shot = small_shot(tmp_path / "trained.usda")
-    model = model_for(read_rigged_hair(shot))
-    assert not any("model" in note for note in bake_rig(shot, tmp_path / "plain.usda", model).notes)
-    return model
+    """A model for the plain small shot."""
+    return model_for(read_rigged_hair(small_shot(tmp_path / "trained.usda")))
 
 
 def _renamed(change):
@@ -40,7 +37,9 @@ def test_joints_with_a_rigs_name_before_theirs_move_alike_and_are_told(edited, t
     shot = edited(_renamed(lambda path: "/".join(f"Ann_{name}" for name in path.split("/"))))
     result = bake_rig(shot, tmp_path / "out.usda", model)
     assert "model: its joints have other names here, 'Ann_hair_0' for 'hair_0'" in result.notes
-    np.testing.assert_array_equal(hair_turns(result.path, CODES), hair_turns(tmp_path / "plain.usda", CODES))
+    plain = bake_rig(tmp_path / "trained.usda", tmp_path / "plain.usda", model)
+    assert not any("model" in note for note in plain.notes)
+    np.testing.assert_array_equal(hair_turns(result.path, CODES), hair_turns(plain.path, CODES))
 
 
 def test_a_character_of_another_size_is_told(edited, tmp_path, model):
@@ -72,6 +71,15 @@ def test_nothing_is_baked_where_neither_head_nor_hair_moves(edited, tmp_path, mo
     with pytest.raises(NeuralocksError, match="/Who/Rig: its head joint 'head' is not animated, so the hair would not"):
         bake_rig(edited(lambda stage: _turned(stage, 0)), tmp_path / "out.usda", still)
     assert bake_rig(edited(lambda stage: _turned(stage, 1)), tmp_path / "out.usda", still).rigs
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_motion_that_does_not_end_as_it_begins_is_told_of_loops_alone(edited, tmp_path, model, loop):
+    notes = bake_rig(edited(lambda stage: _turned(stage, 1)), tmp_path / "out.usda", model, loop=loop).notes
+    told = (
+        "/Who/Rig: joint 'hips/head' is turned by 24 degrees between time codes 1 and 25; a loop must end with the pose"
+    )
+    assert any(note.startswith(told) for note in notes) == any("loop" in note for note in notes) == loop
 
 
 @pytest.mark.parametrize(("last", "told"), [("hair_3", False), ("hips", True)])
