@@ -10,6 +10,7 @@ from pxr import Gf, UsdGeom, UsdSkel
 from neuralocks_core.errors import NeuralocksError
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair
+from usd.skel.clip_codes import SAME
 
 from ..rig_shots import hair_turns, model_for, small_shot
 
@@ -106,3 +107,19 @@ def test_only_a_joint_that_is_here_may_be_meant_in_place_of_the_one_read(tmp_pat
     notes = bake_rig(tmp_path / "trained.usda", tmp_path / "out.usda", other).notes
     said = "/Who/Rig: 'head' is read as neck, but in training 'hair_3' was, which is here, too"
     assert any(note.startswith(said) for note in notes) == told == any("is read as" in note for note in notes)
+
+
+@pytest.mark.parametrize("off", [-0.4, 0.0, 0.4])
+def test_a_frame_and_a_sample_that_rounding_parts_are_one(edited, tmp_path, model, off):
+    """Whichever comes first; a frame between two samples is one more."""
+
+    def shift(stage):
+        rotations = UsdSkel.Animation(stage.GetPrimAtPath("/Who/Motion")).GetRotationsAttr()
+        values = {code: rotations.Get(code) for code in rotations.GetTimeSamples()}
+        rotations.Clear()
+        for code, value in values.items():
+            rotations.Set(value, code + off * SAME)
+
+    shot = edited(shift)
+    assert bake_rig(shot, tmp_path / "out.usda", model, frames="1:25").rigs[0].samples == 25
+    assert bake_rig(shot, tmp_path / "more.usda", model, frames="1.5:25").rigs[0].samples == 25 + 24

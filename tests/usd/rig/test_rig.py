@@ -154,6 +154,8 @@ def test_hair_starts_anew_after_a_cut(tmp_path):
     stage.GetRootLayer().Save()
     found = bake_rig(shot, tmp_path / "found.usda", model)
     assert any("another place at 13" in note for note in found.notes)
+    held = bake_rig(shot, tmp_path / "held.usda", model_for(read_rigged_hair(shot)))
+    assert not any("another place" in note for note in held.notes), "held poses have no past"
     given = bake_rig(shot, tmp_path / "given.usda", model, cuts=[13])
     assert not any("another place" in note for note in given.notes)
     assert (tmp_path / "found.usda").read_bytes() == (tmp_path / "given.usda").read_bytes()
