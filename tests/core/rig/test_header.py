@@ -149,18 +149,22 @@ def test_the_header_needs_no_library(tmp_path):
 
 
 def test_features_from_quaternions(tmp_path):
-    """The header's own features are those that training and baking use, of quaternions of any length that it says."""
+    """The header's own features are those that training and baking use, of quaternions of any length that it says; zero turns nothing."""
     model = random_model()
     export_c(model, tmp_path / "hair.h")
     rng = np.random.default_rng(3)
     q = rng.normal(size=(200, 3, 4))
     q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    q[range(2, 5), range(3)] = 1, 0, 0, 0
     down = np.tile([0.0, -1.0, 0.0], (200, 1))
     head, neck, chest = np.moveaxis(from_quaternion(q), 1, 0)
     relative = np.swapaxes(head, -1, -2)[:, None] @ np.stack([neck, chest], axis=1)
     wanted = held_features(model.spec, relative, np.einsum("nji,nj->ni", head, down))
     lengths = re.search(r"any length from (\S+) to (\S+)", (tmp_path / "hair.h").read_text()).groups()
-    q *= np.exp(rng.uniform(*np.log(np.array(lengths, float)), (200, 3, 1)))
+    sizes = np.exp(rng.uniform(*np.log(np.array(lengths, float)), (200, 3, 1)))
+    sizes[:2] = np.array(lengths, float)[:, None, None]
+    q *= sizes
+    q[range(2, 5), range(3)] = 0
     rows = np.concatenate([q.reshape(200, 12), down], axis=1)
     assert np.abs(run_c(compiled(tmp_path, INPUT_HARNESS), rows, 15) - wanted).max() < 2e-6
 
