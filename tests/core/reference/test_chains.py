@@ -3,10 +3,13 @@
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.linalg import eigh
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from neuralocks_core.body.surface_samples import SurfaceSamples
+from neuralocks_core.reference.chain_contact import BodyMesh, Contacts
 from neuralocks_core.reference.chains import ChainSolver
 from neuralocks_core.rig import find_chains
 from neuralocks_core.rig.kinematics import bone_ends, pose_chains
@@ -138,3 +141,18 @@ def test_a_wind_as_strong_as_gravity_pulls_as_gravity_does():
     wanted = weighed.simulate(heads, 1 / 30)
     assert np.abs(wanted[..., 1:]).max() > 0.05
     np.testing.assert_allclose(blown.simulate(heads, 1 / 30, wind=pull), wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_level_bone_is_pressed_into_what_it_lies_on_by_its_weight(count):
+    """By g / STIFFNESS, whatever its mass is: a joint's contacts share it."""
+    chains, box = chain((0, 0, -BONE), 1), trimesh.creation.box((0.4, 0.1, 0.4))
+    end, samples = chains.origins[0] + chains.bones[0], SurfaceSamples(box.vertices, box.faces, 500)
+    rest = box.vertices[samples.vertices] + end - [0, 0.1, 0]
+    raised = (rest + [0, 0.04, 0])[None, None].repeat(10, axis=1)
+    contacts = Contacts(np.zeros(count, int), np.tile(end, (count, 1)), np.full(count, 0.01))
+    tree = RodTree(chains, RigMaterial(bend=1e-9, rest_support=False))
+    solver = ChainSolver(chains, tree, 6.0, contacts=contacts)
+    turns = solver.simulate(np.tile(np.eye(4), (1, 10, 1, 1)), 1 / 60, BodyMesh(samples, raised, rest))[0].astype(float)
+    ends = bone_ends(chains, *pose_chains(chains, from_quaternion(turns)))[:, 0]
+    np.testing.assert_allclose(end[1] - ends[:, 1], 9.81 / solver.STIFFNESS, rtol=0.02)
