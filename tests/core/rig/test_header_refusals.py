@@ -13,8 +13,9 @@ from tests.core.rig.builders import random_model
 
 def test_what_no_header_computes_is_refused(tmp_path):
     model = random_model((4,) * 2, 8, 0, rig_spec(True))
-    with pytest.raises(NeuralocksError, match="other inputs than a header computes"):
-        export_c(replace(model, spec=replace(model.spec, linear="velocity")), tmp_path / "hair.h")
+    for other in ({"linear": "velocity"}, {"pose_joints": ("neck", "left_shoulder")}):
+        with pytest.raises(NeuralocksError, match="other inputs than a header computes"):
+            export_c(replace(model, spec=replace(model.spec, **other)), tmp_path / "hair.h")
     with pytest.raises(NeuralocksError, match="has no layers"):
         replace(model, layers=())
     with pytest.raises(NeuralocksError, match="too large to compute with"):
@@ -26,6 +27,10 @@ def test_limits_that_the_header_does_not_keep_are_refused(tmp_path):
     model = random_model()
     with pytest.raises(NeuralocksError, match=r"clamps entries of rotations to 0\.625, .*give it the limits of"):
         export_c(replace(model, limits=0.5 * model.limits), tmp_path / "hair.h")
+    limits = model.limits.copy()
+    limits[11] = 1.0  # the last one of the chest's: rounding may be beyond
+    with pytest.raises(NeuralocksError, match="clamps entries of rotations to 1, "):
+        export_c(replace(model, limits=limits), tmp_path / "hair.h")
     export_c(replace(model, limits=0.82 * model.limits), tmp_path / "hair.h")
 
 
