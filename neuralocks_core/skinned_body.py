@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The surface of a character: a mesh that joints and blend shapes move."""
+"""The surface of a character, or one mesh of it, which joints and blend shapes move."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+
+LEAST_WEIGHT = 1e-3
+"""Skin weight below which a joint does not drive a vertex."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,3 +75,13 @@ class Body:
         points = self.shaped(weights)
         blended = np.einsum("vi,vixy->vxy", self.joint_weights, skinning[self.joint_indices, :3])
         return np.einsum("vxy,vy->vx", blended[:, :, :3], points) + blended[:, :, 3]
+
+    def weight_on(self, joints: np.ndarray) -> np.ndarray:
+        """Sum of each vertex's weights (V,) on the joints of a mask (J,)."""
+        return np.sum(self.joint_weights * joints[self.joint_indices], axis=1)
+
+    def driven_by(self, joint_count: int) -> np.ndarray:
+        """Which joints (J,) drive any of its vertices."""
+        used = np.zeros(joint_count, bool)
+        used[self.joint_indices[self.joint_weights > LEAST_WEIGHT]] = True
+        return used

@@ -9,7 +9,7 @@ import numpy as np
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, reworded
 from neuralocks_core.motion import Clip
-from neuralocks_core.rig import HairChains, RigModel, SkinnedMesh, find_chains
+from neuralocks_core.rig import HairChains, RigModel, find_chains
 from neuralocks_core.rig.carried import CarriedHair
 from neuralocks_core.rig.measuring import placed_chains
 from neuralocks_core.rotation import flat, rotation_part, to_quaternion
@@ -31,8 +31,9 @@ def chains_of(rig: RigArrays, character: Character, wanted: str = "") -> HairCha
     Raises:
         NeuralocksError: there are none, or one of them cannot be measured.
     """
+    meshes = None if character.body is None else [character.body]
     try:
-        return find_chains(character, _meshes(character), rig.patterns(wanted) or None)
+        return find_chains(character, meshes, rig.patterns(wanted) or None)
     except NeuralocksError as error:
         # Joints that the patterns became are not what the artist wrote.
         text = re.sub("--chains [^:]*:", lambda _: f"--chains {wanted}:", str(error), count=1)
@@ -46,13 +47,6 @@ def own_turns(own: np.ndarray, motion: Motion, joints: np.ndarray, frames: np.nd
     linear = own[[motion.row(frame) for frame in frames]][:, joints]
     turned = np.where(flat(linear, NONE)[..., None, None], np.eye(3), linear)
     return to_quaternion(rotation_part(turned, "hair bones"))
-
-
-def _meshes(character: Character) -> list[SkinnedMesh] | None:
-    body = character.body
-    if body is None:
-        return None
-    return [SkinnedMesh(body.points, body.triangles, body.joint_indices, body.joint_weights)]
 
 
 @dataclass(eq=False)

@@ -5,13 +5,11 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.network import RigModel, RigSampler, rig_spec
 from neuralocks_core.rig.rigging import assemble_rig
-from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 
 __all__ = [
     "HairChains",
     "RigModel",
     "RigSampler",
-    "SkinnedMesh",
     "assemble_rig",
     "find_chains",
     "rig_spec",

@@ -12,7 +12,7 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.hair_names import says_face, says_feature, says_hair, says_hair_alone
 from neuralocks_core.rig.measuring import measured_chains
 from neuralocks_core.rig.riding import continued, driving, riders
-from neuralocks_core.rig.skinned_mesh import SkinnedMesh
+from neuralocks_core.skinned_body import Body
 
 UNNAMED = 3
 """A row of this many joints that drive skin below a head may be hair, whatever their names."""
@@ -27,7 +27,7 @@ class NoHairChains(NeuralocksError):
 
 
 def find_chains(
-    character: Character, meshes: list[SkinnedMesh] | None = None, patterns: list[str] | None = None
+    character: Character, meshes: list[Body] | None = None, patterns: list[str] | None = None
 ) -> HairChains:
     """The hair chains of a character.
 
@@ -50,7 +50,7 @@ def find_chains(
     return measured_chains(character, sorted(tops), meshes, _matching(character, patterns or []))
 
 
-def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHairChains:
+def _no_chains(character: Character, meshes: list[Body] | None) -> NoHairChains:
     """The error for a character without a chain, with the likely cause: the hair's joints are elsewhere, drive no skin, or have
     names that do not say hair.
     """
@@ -82,7 +82,7 @@ def _no_chains(character: Character, meshes: list[SkinnedMesh] | None) -> NoHair
 
 
 def left_out(
-    character: Character, meshes: list[SkinnedMesh], chains: HairChains | None = None, least: int = UNNAMED
+    character: Character, meshes: list[Body], chains: HairChains | None = None, least: int = UNNAMED
 ) -> list[int]:
     """First joints of chains below the head that may be hair but are not moved: their names say nothing, and they are in a mesh
     that the body drives, too, or single joints in one of found chains; or names say what a face has or wears, such as a beard.
@@ -121,13 +121,13 @@ def left_out(
     return sorted(found)
 
 
-def _beside(skeleton: Skeleton, meshes: list[SkinnedMesh], joints: np.ndarray) -> np.ndarray:
+def _beside(skeleton: Skeleton, meshes: list[Body], joints: np.ndarray) -> np.ndarray:
     """Which joints (J,) bool drive a mesh that one of some joints (J,) bool drives."""
     every = [mesh.driven_by(len(skeleton.names)) for mesh in meshes]
     return np.any([np.zeros(len(joints), bool), *(drives for drives in every if drives[joints].any())], axis=0)
 
 
-def of_the_body(character: Character, meshes: list[SkinnedMesh] | None) -> np.ndarray:
+def of_the_body(character: Character, meshes: list[Body] | None) -> np.ndarray:
     """Which joints (J,) bool drive a mesh that a joint outside the head drives, too."""
     body, outside = np.zeros(len(character.skeleton.names), bool), ~character.of_head
     for mesh in meshes or ():
@@ -182,7 +182,7 @@ def _children(character: Character) -> list[int]:
     return [child for child in every if child not in character.heads]
 
 
-def _by_itself(character: Character, meshes: list[SkinnedMesh] | None) -> list[int]:
+def _by_itself(character: Character, meshes: list[Body] | None) -> list[int]:
     """First joints of the subtrees that are hair by their names or by what they drive."""
     skeleton = character.skeleton
     names, children = character.own_names, skeleton.children
@@ -223,7 +223,7 @@ def _has_leaf_bones(character: Character, used: np.ndarray) -> bool:
     return bool(ends) and all(children[joint] for joint in ends)
 
 
-def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[SkinnedMesh] | None) -> list[int]:
+def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[Body] | None) -> list[int]:
     """Riders of a joint that drives nothing itself but is a hair bone, as in a chain of controls: one other joint that has riders
     too continues from it. Taken for a holder, it would leave each bone to turn about a pivot of its own.
     """
@@ -235,14 +235,14 @@ def _steered(character: Character, joint: int, used: np.ndarray, meshes: list[Sk
     return [] if any(_is_cap(character, rider, meshes) for rider in riding) else riding
 
 
-def _only_shares(skeleton: Skeleton, joint: int, used: np.ndarray, meshes: list[SkinnedMesh]) -> bool:
+def _only_shares(skeleton: Skeleton, joint: int, used: np.ndarray, meshes: list[Body]) -> bool:
     """Whether chains fan out from a joint that has a part of their roots by smoothed weights, but no skin of its own."""
     fan = [child for child in skeleton.children[joint] if used[skeleton.below(child)].any()]
     only = np.arange(len(skeleton.names)) == joint
     return len(fan) >= FAN and not any((mesh.weight_on(only) > 0.55).any() for mesh in meshes)
 
 
-def _is_cap(character: Character, joint: int, meshes: list[SkinnedMesh]) -> bool:
+def _is_cap(character: Character, joint: int, meshes: list[Body]) -> bool:
     """Whether a joint drives the hair on the skull: skin around its middle, nearly as wide and as deep as it is wide. If it turned,
     it would slide over the skull and go through it; the joints below it move.
     """
@@ -255,7 +255,7 @@ def _is_cap(character: Character, joint: int, meshes: list[SkinnedMesh]) -> bool
     return bool((np.ptp(points, axis=0) > CAP * width).all() and (off < ASIDE * width).all())
 
 
-def _skull(character: Character, meshes: list[SkinnedMesh]) -> np.ndarray:
+def _skull(character: Character, meshes: list[Body]) -> np.ndarray:
     """Where the upper half of the head's own skin is, seen from above (n, 2) [m]: without hats, bows and hair on joints of its own."""
     if character.body is None:
         return _driven(character, character.head, meshes)
@@ -263,7 +263,7 @@ def _skull(character: Character, meshes: list[SkinnedMesh]) -> np.ndarray:
     return points[points[:, 1] > points[:, 1].max(initial=0.0) / 2][:, [0, 2]]
 
 
-def _driven(character: Character, joint: int, meshes: list[SkinnedMesh]) -> np.ndarray:
+def _driven(character: Character, joint: int, meshes: list[Body]) -> np.ndarray:
     """Where the vertices that mainly follow a joint are, seen from above (n, 2) [m]."""
     only = np.arange(len(character.skeleton.names)) == joint
     points = np.concatenate([mesh.points[mesh.weight_on(only) > 0.5] for mesh in meshes])

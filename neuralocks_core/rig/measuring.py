@@ -11,8 +11,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.hair_names import says_end
 from neuralocks_core.rig.riding import NO_BONE, continued, driving, in_chains, riders
-from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import rotation_part
+from neuralocks_core.skinned_body import Body
 
 DRIVEN = 0.3
 """Skin on which a joint has more than this weight determines how far its bone reaches."""
@@ -31,9 +31,7 @@ class UnevenJoint(NeuralocksError):
     """A hair joint is scaled more along one axis than along another."""
 
 
-def measured_chains(
-    character: Character, tops: list[int], meshes: list[SkinnedMesh] | None, named: list[int]
-) -> HairChains:
+def measured_chains(character: Character, tops: list[int], meshes: list[Body] | None, named: list[int]) -> HairChains:
     """The chains that begin at these joints.
 
     Args:

@@ -9,7 +9,7 @@ from neuralocks_core.body.collider import Collider
 from neuralocks_core.character import Character
 from neuralocks_core.mesh import rays_through, welded_pieces
 from neuralocks_core.rig.hair_names import says_face
-from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
+from neuralocks_core.skinned_body import LEAST_WEIGHT, Body
 
 MOSTLY = 0.2
 """If joints of the hair move more than this share of a mesh without skin, all of it is hair, with ribbons and pins."""
@@ -40,7 +40,7 @@ TO_CROWN = _ways(((-135, -90, 90, 135, 180), (25, 55)), ((0,), (85,)))
 """Directions from there in which there is no face."""
 
 
-def parted(character: Character, meshes: list[SkinnedMesh], moving: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def parted(character: Character, meshes: list[Body], moving: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Which triangles are body and which vertices are hair that moves.
 
     The roots of locks, and the cap that they grow from, ride on the head as its skin does, and each may be in any mesh. So each
@@ -90,7 +90,7 @@ class _Pieces:
     hairy: np.ndarray
 
     @classmethod
-    def of(cls, character: Character, mesh: SkinnedMesh, moving: np.ndarray) -> "_Pieces":
+    def of(cls, character: Character, mesh: Body, moving: np.ndarray) -> "_Pieces":
         faces = np.array([says_face(name) for name in character.own_names])
         number = welded_pieces(mesh.points, mesh.triangles) if len(mesh.points) else np.zeros(0, int)
         moves, outside = mesh.weight_on(moving) > LEAST_WEIGHT, mesh.weight_on(~character.of_head) > MAINLY
@@ -100,7 +100,7 @@ class _Pieces:
         return cls(number, moves, riding, *(np.bincount(number, vertices, count) > 0 for vertices in driven))
 
 
-def _with_face(character: Character, meshes: list[SkinnedMesh], every: list[_Pieces]) -> list[np.ndarray]:
+def _with_face(character: Character, meshes: list[Body], every: list[_Pieces]) -> list[np.ndarray]:
     """For each mesh, the pieces (n,) that are the innermost in directions of the face."""
     nearest, winner = np.full(len(TO_FACE), np.inf), np.full((len(TO_FACE), 2), -1)
     for place, (mesh, own) in enumerate(zip(meshes, every)):
@@ -113,7 +113,7 @@ def _with_face(character: Character, meshes: list[SkinnedMesh], every: list[_Pie
     return found
 
 
-def _caps(character: Character, mesh: SkinnedMesh, own: _Pieces) -> np.ndarray:
+def _caps(character: Character, mesh: Body, own: _Pieces) -> np.ndarray:
     """Pieces (n,) that cover the crown and are not as large as a hat."""
     ray, piece, _ = _hits(character, mesh, own, TO_CROWN)
     hit = np.zeros((len(TO_CROWN), len(own.hairy)), bool)
@@ -125,7 +125,7 @@ def _caps(character: Character, mesh: SkinnedMesh, own: _Pieces) -> np.ndarray:
     return (hit.mean(axis=0) > CROWN) & (size <= HAT * character.times_human)
 
 
-def _surface(meshes: list[SkinnedMesh], every: list[_Pieces], skins: list[np.ndarray]) -> Collider | None:
+def _surface(meshes: list[Body], every: list[_Pieces], skins: list[np.ndarray]) -> Collider | None:
     """The skin that rides on the head, in bind world; None if there is none."""
     found = [
         mesh.points[own.riding[skin[own.number[own.riding[:, 0]]]]] for mesh, own, skin in zip(meshes, every, skins)
@@ -134,7 +134,7 @@ def _surface(meshes: list[SkinnedMesh], every: list[_Pieces], skins: list[np.nda
     return Collider(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)) if len(corners) else None
 
 
-def _on_skull(character: Character, mesh: SkinnedMesh, own: _Pieces, surface: Collider | None) -> np.ndarray:
+def _on_skull(character: Character, mesh: Body, own: _Pieces, surface: Collider | None) -> np.ndarray:
     """Pieces (n,) that lie on the head's skin from where only hair grows."""
     count, near = len(own.hairy), NEAR * character.times_human
     offset = character.canonical(mesh.points) - character.head_centre
@@ -150,7 +150,7 @@ def _on_skull(character: Character, mesh: SkinnedMesh, own: _Pieces, surface: Co
     return found
 
 
-def _hits(character: Character, mesh: SkinnedMesh, own: _Pieces, ways: np.ndarray) -> tuple[np.ndarray, ...]:
+def _hits(character: Character, mesh: Body, own: _Pieces, ways: np.ndarray) -> tuple[np.ndarray, ...]:
     """Ray, piece and distance [m] wherever rays from the middle of the head meet what rides on it, (H,) each."""
     ray, triangle, far = rays_through(character.canonical(mesh.points), own.riding, character.head_centre, ways)
     return ray, own.number[own.riding[triangle, 0]], far

@@ -5,7 +5,7 @@ import numpy as np
 
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig.hair_names import says_twist, says_worn
-from neuralocks_core.rig.skinned_mesh import SkinnedMesh
+from neuralocks_core.skinned_body import Body
 
 NO_BONE = 1e-5
 """Shorter bones [m] have no direction."""
@@ -81,7 +81,7 @@ def continued(character: Character, joint: int, drives: np.ndarray) -> int:
     return joint
 
 
-def driving(skeleton: Skeleton, meshes: list[SkinnedMesh] | None) -> np.ndarray:
+def driving(skeleton: Skeleton, meshes: list[Body] | None) -> np.ndarray:
     """Which joints (J,) bool drive skin of any mesh."""
     drives = np.zeros(len(skeleton.names), bool)
     for mesh in meshes or ():

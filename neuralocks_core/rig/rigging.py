@@ -11,7 +11,6 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.kinematics import skin_weights
 from neuralocks_core.rig.parting import parted
-from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.skinned_body import Body
 
 ROOM = 0.2
@@ -52,9 +51,7 @@ class HairRig:
         return (away < np.linalg.norm(hair, axis=1).max() + ROOM)[body.triangles].all(axis=1)
 
 
-def assemble_rig(
-    character: Character, meshes: list[SkinnedMesh], chains: HairChains | list[str] | None = None
-) -> HairRig:
+def assemble_rig(character: Character, meshes: list[Body], chains: HairChains | list[str] | None = None) -> HairRig:
     """Split a character's meshes, which `character.body` holds one after another, by its hair chains: the given ones, those that
     match patterns, or those that `find_chains` finds by itself.
     """
@@ -76,7 +73,7 @@ def assemble_rig(
     body = character.body
     if body is not None:
         faces = np.concatenate(body_triangles) if body_triangles else np.zeros((0, 3), int)
-        body = Body(body.points, faces, body.joint_indices, body.joint_weights, body.shapes) if len(faces) else None
+        body = replace(body, triangles=faces) if len(faces) else None
     rig = HairRig(
         character,
         chains,

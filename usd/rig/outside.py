@@ -7,7 +7,7 @@ from neuralocks_core.anatomy.joint_names import carrier, leaf
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import UNNAMED, left_out, of_the_body
 from neuralocks_core.rig.hair_names import says_face, says_hair_alone
-from neuralocks_core.rig.skinned_mesh import LEAST_WEIGHT, SkinnedMesh
+from neuralocks_core.skinned_body import LEAST_WEIGHT, Body
 
 from ..shot.notes import heads_above
 from ..skel.stage_rig import StageRig
@@ -41,7 +41,7 @@ def outside_notes(source: StageRig) -> list[str]:
     return [f"{source.path}: '{leaf(loose[0])}' {hang} not moved; {remedy}"]
 
 
-def left_out_notes(source: StageRig, meshes: list[SkinnedMesh], chains: HairChains) -> list[str]:
+def left_out_notes(source: StageRig, meshes: list[Body], chains: HairChains) -> list[str]:
     """The note on chains below the head that were not found, if others were found automatically.
 
     Args:
@@ -58,7 +58,7 @@ def left_out_notes(source: StageRig, meshes: list[SkinnedMesh], chains: HairChai
     return [f"{source.path}: {what} not moved; if {they} hair, name all that is to move with --chains"]
 
 
-def unnamed_notes(source: StageRig, meshes: list[SkinnedMesh], strands: bool) -> list[str]:
+def unnamed_notes(source: StageRig, meshes: list[Body], strands: bool) -> list[str]:
     """The note on joints below the head that drive skin, if none was recognised as hair, and why.
 
     Args:

@@ -17,7 +17,6 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.finding import NoHairChains, fits
 from neuralocks_core.rig.measuring import UNEVEN, placed_chains
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
-from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.skinned_body import Body
 
 from ..border.amounts import check_names
@@ -220,9 +219,9 @@ def is_baked(source: StageRig) -> bool:
     return animation is not None and animation.GetName() == BAKED
 
 
-def core_meshes(source: StageRig) -> list[SkinnedMesh]:
+def core_meshes(source: StageRig) -> list[Body]:
     """The skinned meshes of a skeleton in the core's axes and metres, in the order of the merged body."""
-    return [SkinnedMesh(*mesh.in_bind(source.to_bind), mesh.indices, mesh.weights) for mesh in source.meshes]
+    return [Body(*mesh.in_bind(source.to_bind), mesh.indices, mesh.weights) for mesh in source.meshes]
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:

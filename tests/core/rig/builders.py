@@ -8,7 +8,7 @@ import trimesh
 
 from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.character import Character, Skeleton
-from neuralocks_core.rig import RigModel, SkinnedMesh, find_chains, rig_spec
+from neuralocks_core.rig import RigModel, find_chains, rig_spec
 from neuralocks_core.rig.network import held_features
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rotation import from_quaternion
@@ -70,13 +70,13 @@ def with_balls(fine: int = 3) -> tuple[HairRig, float]:
     return replace(rig, character=replace(who, body=Body(points, faces, joints, np.ones_like(joints, float)))), radius
 
 
-def skin(who: Character, joints: dict[str, tuple]) -> SkinnedMesh:
+def skin(who: Character, joints: dict[str, tuple]) -> Body:
     """One triangle of skin per joint name, at the points given (3, 3)."""
     leaves = [name.rsplit("/", 1)[-1] for name in who.skeleton.names]
     points = np.concatenate([np.asarray(p, float).reshape(3, 3) for p in joints.values()])
     indices = np.repeat([leaves.index(name) for name in joints], 3)[:, None]
     triangles = np.arange(len(points)).reshape(-1, 3)
-    return SkinnedMesh(points, triangles, indices, np.ones_like(indices, float))
+    return Body(points, triangles, indices, np.ones_like(indices, float))
 
 
 def steered(leaf, next_leaf=True):
@@ -88,7 +88,7 @@ def steered(leaf, next_leaf=True):
     return character(rows), skins
 
 
-def ring(who: Character, joint: str, size=1.0) -> SkinnedMesh:
+def ring(who: Character, joint: str, size=1.0) -> Body:
     """Skin around the head, which a joint drives."""
     points = np.stack([np.cos(np.arange(12)), np.full(12, 1.65), np.sin(np.arange(12))], axis=-1)
     mesh = skin(who, {joint: points[:3]})

@@ -14,7 +14,6 @@ from neuralocks_core.rig.kinematics import bone_ends, pose_chains
 from neuralocks_core.rig.network import feature_columns
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.rig.rods import RigMaterial
-from neuralocks_core.rig.skinned_mesh import SkinnedMesh
 from neuralocks_core.rotation import from_quaternion, from_vector
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.training.rig import deepest
@@ -151,8 +150,8 @@ def assembled(rig: HairRig, body: Body, joint: int) -> HairRig:
     ribbon = rig.points + who.skeleton.bind[who.head, :3, 3]
     on = rig.chains.joints[rig.weights[:, 1:].argmax(axis=1)][:, None]
     meshes = [
-        SkinnedMesh(body.points, body.triangles, joints, np.ones_like(joints, float)),
-        SkinnedMesh(ribbon, np.arange(len(ribbon)).reshape(-1, 3), on, np.ones((len(ribbon), 1))),
+        Body(body.points, body.triangles, joints, np.ones_like(joints, float)),
+        Body(ribbon, np.arange(len(ribbon)).reshape(-1, 3), on, np.ones((len(ribbon), 1))),
     ]
     both = Body(
         np.concatenate([body.points, ribbon]),

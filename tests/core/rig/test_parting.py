@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from neuralocks_core.mesh import rays_through
-from neuralocks_core.rig import SkinnedMesh, find_chains
+from neuralocks_core.rig import find_chains
 from neuralocks_core.rig.parting import parted
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.skinned_body import Body
@@ -84,7 +84,7 @@ def _mesh(parts: dict, names: list[str]):
     starts = np.cumsum([0, *counts])
     indices = np.array([LEAVES.index(leaf) for each in joints for leaf in each])[:, None]
     faces = np.concatenate([each + start for each, start in zip(faces, starts)])
-    return SkinnedMesh(np.concatenate(points), faces, indices, np.ones(indices.shape)), np.repeat(names, counts)
+    return Body(np.concatenate(points), faces, indices, np.ones(indices.shape)), np.repeat(names, counts)
 
 
 @pytest.mark.parametrize("dense", [False, True])
