@@ -75,7 +75,7 @@ class StageRig:
         """As `carrying_at`, in the rest pose."""
         if "head" not in self.character.humanoid:
             return np.eye(4)
-        return self.character.carrying(self._to_world @ self.source.at_rest @ self._trim)
+        return self.character.carrying(self._joints_at_rest)
 
     @cached_property
     def bind_shown(self) -> np.ndarray:
@@ -84,7 +84,11 @@ class StageRig:
 
     def joints_at(self, time_code: float) -> np.ndarray:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
-        return self._to_world @ self.source.posed([time_code])[0] @ self._trim
+        return self.border.to_core @ self.source.posed([time_code])[0] @ self._trim
+
+    @property
+    def _joints_at_rest(self) -> np.ndarray:
+        return self.border.to_core @ self.source.at_rest @ self._trim
 
     def shape_at(self, time_code: float) -> np.ndarray:
         """Blend shape weights (B,) as a renderer sees them at a time code: between samples of the clip, the way from one to the next
@@ -155,8 +159,7 @@ class StageRig:
 
     def _reference_note(self, told: np.ndarray, cuts: np.ndarray) -> list[str]:
         """The note on a reference pose in the first samples, unless the jump from there is told already."""
-        rest = self._to_world @ self.source.at_rest @ self._trim
-        end = reference_end(self.clip, self.character, [self.character.skeleton.bind, rest])
+        end = reference_end(self.clip, self.character, [self.character.skeleton.bind, self._joints_at_rest])
         if end is None or np.isclose(told, end).any():
             return []
         every = self._named(np.union1d(cuts, [end]), most=100)
@@ -217,10 +220,6 @@ class StageRig:
     def motion_sketch(self) -> str:
         """The `motion_sketch` of its skeleton."""
         return motion_sketch(self.source, self.border.rate)
-
-    @cached_property
-    def _to_world(self) -> np.ndarray:
-        return self.border.to_core
 
     @cached_property
     def _trim(self) -> np.ndarray:
