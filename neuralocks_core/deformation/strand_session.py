@@ -56,11 +56,13 @@ class StrandSession:
         Raises:
             NeuralocksError: the vector has the wrong shape, or is not one of finite numbers.
         """
-        result = self._by_chunk(self._displaced(vector), SHAPE)
-        still = ~self.strands.valid
-        if still.any():
-            result[still] = 0
-        return result.reshape(len(result), K, 3)
+        result = np.empty((len(self.strands.rest), K, 3), np.float32)
+
+        def put(chunk: slice, values: np.ndarray) -> None:
+            result[chunk] = values
+
+        self.each(vector, put)
+        return result
 
     def _displaced(self, vector: np.ndarray) -> Callable[[slice], np.ndarray]:
         """What gives a chunk's displacement (n, 72) in a frame. What strands share is computed here, once."""
