@@ -237,14 +237,14 @@ class Character:
         """Which body vertices (V,) move mainly with the head or a joint below it, including hats and hair cards."""
         if self.body is None:
             return None
-        return np.sum(self.body.joint_weights * self.of_head[self.body.joint_indices], axis=1) > 0.5
+        return self.body.weight_on(self.of_head) > 0.5
 
     @cached_property
     def on_head_joint(self) -> np.ndarray | None:
         """Which body vertices (V,) move mainly with the head's own joint."""
         if self.body is None:
             return None
-        return np.sum(self.body.joint_weights * (self.body.joint_indices == self.head), axis=1) > 0.5
+        return self.body.weight_on(np.arange(len(self.skeleton.names)) == self.head) > 0.5
 
     @cached_property
     def skin(self) -> np.ndarray | None:

@@ -207,7 +207,7 @@ def _scalp(character, faces):
 def _colors(body, faces, labels):
     """Skin where a suit would end, a dark suit elsewhere, brown eyes; linear RGB (V, 3)."""
     bare = np.isin(labels, ["head", "neck_01", "hand_l", "hand_r"])
-    share = np.sum(body.joint_weights * bare[body.joint_indices], axis=1)
+    share = body.weight_on(bare)
     share = np.clip((share - 0.4) / 0.2, 0, 1)[:, None]
     colors = share * [0.58, 0.38, 0.29] + (1 - share) * [0.09, 0.1, 0.12]
     part = connected_pieces(faces, len(body.points))

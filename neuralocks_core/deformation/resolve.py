@@ -259,7 +259,7 @@ def _stands_still(character: Character, body: Body, clip: Clip) -> np.ndarray:
     still = np.sum(body.joint_weights * each, axis=1) < STILL * character.times_human
     on_head = character.carrying_joint == character.head
     head = character.of_head if on_head else character.skeleton.below(character.carrying_joint)
-    still &= np.sum(body.joint_weights * head[body.joint_indices], axis=1) > HEAD
+    still &= body.weight_on(head) > HEAD
     for offsets, varies in zip(body.shapes.values(), np.ptp(clip.shape, axis=0) > 1e-6):
         if varies:
             still &= ~(np.abs(offsets) > 1e-5).any(axis=1)

@@ -35,7 +35,7 @@ class BodyPatch:
 
     def __init__(self, near: Body, character: Character, count: int):
         # The hair was fitted to its own head, with the face on it: other bodies vary below it.
-        on_head = np.sum(near.joint_weights * character.of_head[near.joint_indices], axis=1)
+        on_head = near.weight_on(character.of_head)
         shapes = {}
         for (name, offsets), of_body in zip(near.shapes.items(), character.body_shapes):
             if not of_body:
