@@ -57,12 +57,12 @@ def _lattice_points(places: np.ndarray, spacing: float) -> tuple[np.ndarray, np.
     return point.ravel(), size
 
 
-def lock_codes(codes: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = None) -> np.ndarray:
+def lock_codes(codes: np.ndarray, lock: np.ndarray, valid: np.ndarray) -> np.ndarray:
     """Mean code of each strand's lock (z_lock of the paper, section 3.3): `lock_means`, (S, D)."""
     return lock_means(codes, lock, valid)[lock]
 
 
-def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = None) -> np.ndarray:
+def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray) -> np.ndarray:
     """Means over the strands of each lock.
 
     Args:
@@ -73,7 +73,7 @@ def lock_means(values: np.ndarray, lock: np.ndarray, valid: np.ndarray | None = 
     Returns:
         (L, D) float32.
     """
-    weight = np.ones(len(lock)) if valid is None else np.where(valid, 1.0, 1e-6)
+    weight = np.where(valid, 1.0, 1e-6)
     share = np.bincount(lock, weight)
     mean = np.stack([np.bincount(lock, weight * column) for column in np.asarray(values, np.float64).T], axis=1)
     return (mean / np.maximum(share, 1e-12)[:, None]).astype(np.float32)

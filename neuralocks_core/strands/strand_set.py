@@ -26,7 +26,8 @@ PLACEHOLDER_LENGTH = 0.01
 SHORTEST_EDGE = 1e-7
 """A strand with a shorter edge [m] between the network's vertices has no direction there, and does not move."""
 
-__all__ = ["StrandSet", "root_frames", "root_uv", "scalp_local", "strand_set", "strands_on"]
+EACH = ("rest", "valid", "uv", "root_frame", "lock", "length")
+"""Fields of a StrandSet with one value for each strand; the others are the head's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,17 +62,7 @@ class StrandSet:
 
     def subset(self, strands: np.ndarray) -> StrandSet:
         """Only the given strands ((N,) indices or (S,) mask). Lock numbers stay as they are."""
-        return StrandSet(
-            rest=self.rest[strands],
-            valid=self.valid[strands],
-            uv=self.uv[strands],
-            root_frame=self.root_frame[strands],
-            lock=self.lock[strands],
-            length=self.length[strands],
-            head_origin=self.head_origin,
-            head_centre=self.head_centre,
-            facing=self.facing,
-        )
+        return replace(self, **{name: getattr(self, name)[strands] for name in EACH})
 
     def whole_locks(self, count: int, seed: int = 0) -> np.ndarray:
         """Indices of at most `count` valid strands, in whole locks except the last; the locks are chosen at random over the
@@ -95,11 +86,10 @@ class StrandSet:
         """Strand sets of one head, one after another; each keeps its own locks."""
         if len(sets) == 1:
             return sets[0]
-        fields = ("rest", "valid", "uv", "root_frame", "length")
-        values = {name: np.concatenate([getattr(each, name) for each in sets]) for name in fields}
+        values = {name: np.concatenate([getattr(each, name) for each in sets]) for name in EACH}
         before = np.cumsum([0, *(each.lock.max(initial=-1) + 1 for each in sets[:-1])])
         lock = np.concatenate([each.lock + first for each, first in zip(sets, before)])
-        return replace(sets[0], lock=lock.astype(np.int32), **values)
+        return replace(sets[0], **values | {"lock": lock.astype(np.int32)})
 
 
 def strands_on(character: Character, groom: Groom) -> StrandSet:
