@@ -19,7 +19,6 @@ from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.models.runtime import cores
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.rig.rigging import moving_joints
-from neuralocks_core.runtime import cores
 from neuralocks_core.skinned_body import LEAST_WEIGHT
 
 from ..border.damage import names_damage
