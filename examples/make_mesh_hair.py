@@ -92,7 +92,7 @@ def make_character(path: Path, body_path: Path) -> None:
     hair = _hair(body_stage, rig.character)
     stage = _layer_over(path, body_path)
     skeleton = UsdSkel.Skeleton(stage.OverridePrim(skeleton_prim.GetPath()))
-    _add_joints(skeleton, rig.source, hair)
+    _add_joints(skeleton, rig.joints, hair)
     _add_mesh(stage, skeleton, hair)
     stage.GetRootLayer().Save()
 

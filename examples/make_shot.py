@@ -104,8 +104,8 @@ def write_groom(path: Path, groom: Groom, rig: StageRig) -> None:
     if groom.root_uv is not None:
         uv = primvars.CreatePrimvar("groom_root_uv", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.uniform)
         uv.Set(Vt.Vec2fArray.FromNumpy(np.float32(groom.root_uv)))
-    binding = bind_rigidly(UsdSkel.Skeleton(rig.source.prim), curves.GetPrim(), np.eye(4), 0)
-    binding.CreateJointsAttr([rig.source.names[rig.character.head]])
+    binding = bind_rigidly(UsdSkel.Skeleton(rig.joints.prim), curves.GetPrim(), np.eye(4), 0)
+    binding.CreateJointsAttr([rig.joints.names[rig.character.head]])
     stage.Save()
 
 

@@ -88,7 +88,7 @@ def test_an_avatar_comes_with_its_motion_and_what_it_wears(tmp_path, fps):
     named = done.stdout.strip().splitlines()[-1].replace("--chains", "").split()
     hair = read_rigged_hair(out, chains=named)
     assert sorted(hair.rig.chains.tops) == sorted(named) == ["Hair_1", "Hair_1_2"]
-    animation = UsdSkel.Animation(hair.source.source.animation)
+    animation = UsdSkel.Animation(hair.stage_rig.joints.animation)
     head = [name.rsplit("/", 1)[-1] for name in animation.GetJointsAttr().Get()].index("Head")
     turns = animation.GetRotationsAttr()
     first, last = (turns.Get(code)[head] for code in (turns.GetTimeSamples()[0], turns.GetTimeSamples()[-1]))

@@ -56,7 +56,7 @@ class Over:
     @property
     def stage(self) -> Usd.Stage:
         """The file's."""
-        return self.rig.source.prim.GetStage()
+        return self.rig.joints.prim.GetStage()
 
     def notes(self) -> list[str]:
         """The note on hair that the file has already, which new hair does not replace."""

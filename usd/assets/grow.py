@@ -89,7 +89,7 @@ def whose_head(
     """
     rigs = read_rigs(character, skeleton, head)
     rig = rigs[0]
-    (check_not_over if with_character else check_not_input)(out, rig.source.prim.GetStage())
+    (check_not_over if with_character else check_not_input)(out, rig.joints.prim.GetStage())
     over = Over(rig, as_path(character, "character")) if with_character else None
     return rig, over, [*first_of(rigs), *rig.notes, *unlikely_head(rig), *(over.notes() if over else [])]
 

@@ -61,7 +61,7 @@ def read_asked(
     else:
         shot = read_shot(shot, **how, cuts=given_cuts(cuts, loop), still=wind is not None)
     check_frames_named(shot.path, frames, shot.first, shot.last, shot.rigs)
-    samples = [code for rig in shot.rigs for code in rig.source.keys.every]
+    samples = [code for rig in shot.rigs for code in rig.joints.keys.every]
     return shot, time_codes(frames, shot.first, shot.last, subframes, shot.border.frame, samples)
 
 

@@ -232,11 +232,11 @@ def inspect(
 
     hair = read_rigged_hair(character, skeleton=skeleton, head=head, chains=chains, joints=pairs(joint, "--joint"))
     check_patterns(hair, chains)
-    rows, notes = describe_chains(hair.rig.chains), rigged_notes(hair.source) + chain_notes(hair, chains)
+    rows, notes = describe_chains(hair.rig.chains), rigged_notes(hair.stage_rig) + chain_notes(hair, chains)
     if as_json:
-        print_json({"skeleton": hair.source.path, "chains": rows, "notes": notes})
+        print_json({"skeleton": hair.stage_rig.path, "chains": rows, "notes": notes})
         return
-    say(f"{hair.source.path}: {counted(len(hair.rig.chains), 'hair joint')} in {counted(len(rows), 'chain')}")
+    say(f"{hair.stage_rig.path}: {counted(len(hair.rig.chains), 'hair joint')} in {counted(len(rows), 'chain')}")
     for row in rows:
         say(f"  {row['name']}: {counted(row['joints'], 'joint')}, {100 * row['length [m]']:.1f} cm")
     note(notes)

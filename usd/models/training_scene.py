@@ -135,7 +135,7 @@ def _file(
     prims = open_curves(prims)
     empty = without_points(prims)
     prims, brought = [prim for prim in prims if prim not in empty], None
-    if stage.GetRootLayer() == rig.source.prim.GetStage().GetRootLayer():
+    if stage.GetRootLayer() == rig.joints.prim.GetStage().GetRootLayer():
         prims = _own(prims, rig, head, joints, notes)
     else:
         brought = rig.border.from_core @ rig.border.unless_told(stage).to_core
@@ -161,7 +161,7 @@ def _own(prims, rig: StageRig, head: str | None, joints: dict[str, str] | None, 
     Raises:
         NeuralocksError: all are another's.
     """
-    stage = rig.source.prim.GetStage()
+    stage = rig.joints.prim.GetStage()
     skeletons = find_skeletons(stage)
     if len(skeletons) < 2:
         return prims

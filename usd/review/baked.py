@@ -176,5 +176,5 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
 def _named_head(shot: Shot) -> str | None:
     """The joint that hair was baked with, if names find another one; None if they agree, or no single one is recorded."""
     told = {recorded_joint(item.prim) for item in shot.grooms if recorded_joint(item.prim) not in (None, item.joint)}
-    known = {name for rig in shot.rigs for name in rig.source.names}
+    known = {name for rig in shot.rigs for name in rig.joints.names}
     return told.pop() if len(told) == 1 and told <= known else None

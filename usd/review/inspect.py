@@ -101,7 +101,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
         spoils += rig.notes + weight_notes(rig) + rig_notes(rig, read) + another_head(rig) + lies_down(rig)
         spoils += partial_body(rig, bodies.of(rig)[1])
         spoils += [] if told else rig.cut_notes()
-    moving = [rig for rig in rigs if rig.source.animated]
+    moving = [rig for rig in rigs if rig.joints.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))
         spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
@@ -123,17 +123,17 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
 
 def _rig(rig: StageRig) -> dict:
     humanoid = rig.character.humanoid
-    found = {name: rig.source.names[joint] for name, joint in humanoid.items()}
+    found = {name: rig.joints.names[joint] for name, joint in humanoid.items()}
     body = rig.character.body
     width = rig.character.head_width
     return {
         "path": rig.path,
-        "joints": len(rig.source.names),
-        "joint names": list(rig.source.names),
-        "animated": rig.source.animated,
-        "animation": None if rig.source.animation is None else str(rig.source.animation.GetPath()),
+        "joints": len(rig.joints.names),
+        "joint names": list(rig.joints.names),
+        "animated": rig.joints.animated,
+        "animation": None if rig.joints.animation is None else str(rig.joints.animation.GetPath()),
         "moved by a rig bake": is_baked(rig),
-        "samples": len(rig.source.keys.every),
+        "samples": len(rig.joints.keys.every),
         "head": found.get("head"),
         "head found by": humanoid.reasons.get("head"),
         "head width [m]": None if width is None else round(width, 3),
@@ -151,7 +151,7 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
     try:
         with names_uneven_prims(rig):
             chains = assemble_rig(rig.character, meshes, of_bake(rig)).chains
-        check_authored(rig.source.prim)
+        check_authored(rig.joints.prim)
         check_orients(rig, chains)
     except NoHairChains:
         spoils += unnamed_notes(rig, meshes, strands)
@@ -167,7 +167,7 @@ def _chains(rig: StageRig, spoils: list[str], strands: bool) -> list[dict]:
 
 def _how_baked(rig: StageRig) -> dict:
     """How hair bones were baked, if they were."""
-    made = recorded(rig.source.animation) if rig.source.animation else {}
+    made = recorded(rig.joints.animation) if rig.joints.animation else {}
     return {"baked with": made} if made else {}
 
 

@@ -138,7 +138,7 @@ def _scene(path, grooms, skeleton, head, tell) -> tuple[drawing.Scene, Border]:
     scene = rigged_scene(rigged)
     if tell and (notes := _undrawn(rigged.path, rigged.others)):
         tell(notes)
-    return scene, rigged.source.border
+    return scene, rigged.stage_rig.border
 
 
 def _undrawn(drawn: str, others: Sequence[str]) -> list[str]:

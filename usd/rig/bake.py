@@ -118,11 +118,11 @@ def bake_rig(
     stage = found[0].stage
     check_not_over(out, stage)
     bound = _each(found, lambda hair: BoundHair.of(hair, model, frames, subframes, blown is not None), left)
-    check_cuts(cuts, [one.hair.source for one in bound])
+    check_cuts(cuts, [one.hair.stage_rig for one in bound])
     notes = [*shortcomings("model", "rig", model.report), *map(left_out, left)]
     for one in bound:
         notes += one.notes(loop, find_cuts=cuts is None)
-        notes += asked_notes(stage, [one.hair.source], one.wanted, loop)
+        notes += asked_notes(stage, [one.hair.stage_rig], one.wanted, loop)
     notes += without_strength(strength, model.dynamic)
     notes = list(dict.fromkeys(notes))
     if tell:
@@ -132,15 +132,15 @@ def bake_rig(
     counter = _Counter(sum(len(one.codes) for one in bound), progress)
 
     def moved(one: BoundHair) -> MovedHair:
-        turns, held = one.turns(loop, strength, in_core(blown, one.hair.source.border), counter)
-        said.extend(held + one.hair.source.notes)  # also on poses between those of the clip
+        turns, held = one.turns(loop, strength, in_core(blown, one.hair.stage_rig.border), counter)
+        said.extend(held + one.hair.stage_rig.notes)  # also on poses between those of the clip
         return MovedHair(one.hair, one.codes, turns, one.outdated)
 
     written = _each(bound, moved, still)
     facts = {"strength": float(strength), "loop": loop, **wind_facts(blown)}
     animations = write_rig_layer(written, shot, out, facts)
     late = [text for text in dict.fromkeys([*map(left_out, still), *said]) if text not in notes]
-    late += also_changed((one.hair.source.source.prim for one in written), find_skeletons(stage))
+    late += also_changed((one.hair.stage_rig.joints.prim for one in written), find_skeletons(stage))
     late += out_of_place(stage, out)
     if tell:
         tell(late)

@@ -64,12 +64,14 @@ class BoundHair:
             size = model.chains.check_same(here)
         except NeuralocksError as error:
             raise NeuralocksError("; ".join([str(error), *_likelier(hair, model)])) from None
-        if stops := without_turn(hair.source, model.spec.pose_joints):
+        if stops := without_turn(hair.stage_rig, model.spec.pose_joints):
             raise NeuralocksError(stops[0])
-        first, last = frame_range(hair.stage, [hair.source])
+        first, last = frame_range(hair.stage, [hair.stage_rig])
         if windy:
-            check_frames_named(hair.path, frames, first, last, [hair.source])
-        wanted = time_codes(frames, first, last, subframes, hair.source.border.frame, hair.source.source.keys.every)
+            check_frames_named(hair.path, frames, first, last, [hair.stage_rig])
+        wanted = time_codes(
+            frames, first, last, subframes, hair.stage_rig.border.frame, hair.stage_rig.joints.keys.every
+        )
         return cls(hair, model, size, trained_name, wanted, _with_samples(hair, wanted), _outdated(hair))
 
     @property
@@ -95,30 +97,30 @@ class BoundHair:
         Raises:
             NeuralocksError: the head is held as it was bound, so that no hair would move.
         """
-        source, chains = self.hair.source, self.model.chains
-        clip = source.cycle if loop else source.clip
-        carried = CarriedHair(self.model, self.joints, source.character, clip)
+        stage_rig, chains = self.hair.stage_rig, self.model.chains
+        clip = stage_rig.cycle if loop else stage_rig.clip
+        carried = CarriedHair(self.model, self.joints, stage_rig.character, clip)
         turns = np.empty((len(self.codes), len(chains), 4))
         for row, code in enumerate(self.codes):
             # One at a time: a matrix product may round otherwise for other batches.
-            second = source.border.seconds([code])
+            second = stage_rig.border.seconds([code])
             wrapped = clip.loop and not clip.start <= second[0] <= clip.end
-            shown = clip.at(second) if wrapped else source.joints_at(code)[None]
+            shown = clip.at(second) if wrapped else stage_rig.joints_at(code)[None]
             turns[row] = carried.turns(second, strength, shown, wind)[0]
             say()
-        turns = source.authored_turns(self.joints, chains.turns_on(self.hair.rig.chains, turns))
+        turns = stage_rig.authored_turns(self.joints, chains.turns_on(self.hair.rig.chains, turns))
         return turns, self._held(carried.carriers, turns, wind)
 
     def notes(self, loop: bool, find_cuts: bool) -> list[str]:
         """What a user should know before hair is turned."""
-        rig, read = self.hair.source, self.model.spec.pose_joints
+        rig, read = self.hair.stage_rig, self.model.spec.pose_joints
         return [
             *self._renamed(),
             *self._resized(),
             *self._read_otherwise(),
             *rigged_notes(rig, read),
-            *_name_notes(rig.source),
-            *([outdated_note(rig.source, self.outdated)] if self.outdated else []),
+            *_name_notes(rig.joints),
+            *([outdated_note(rig.joints, self.outdated)] if self.outdated else []),
             *mirrored_notes(rig, self.hair.rig.chains),
             *offset_notes(rig, self.hair.rig.chains),
             *(rig.loop_notes(self.wanted, self.joints) if loop else []),
@@ -128,8 +130,8 @@ class BoundHair:
 
     def _held(self, carriers: np.ndarray, turns: np.ndarray, wind: Wind | None) -> list[str]:
         """The note on a head that is held still, with all other joints that carry hair, in a calm; raises as `turns`."""
-        rig = self.hair.source
-        source, character, joints = rig.source, rig.character, rig.clip.joints
+        rig = self.hair.stage_rig
+        source, character, joints = rig.joints, rig.character, rig.clip.joints
         if np.ptp(joints[:, carriers], axis=0).max() >= 1e-7:
             return []
         if source.ignored:
@@ -156,13 +158,13 @@ class BoundHair:
 
     def _read_otherwise(self) -> list[str]:
         """The notes on joints that this rig has as the model's has them, but that others are read in place of."""
-        source, reads = self.hair.source, self.model.training.get("reads")
-        names, notes = [leaf(name) for name in source.source.names], []
+        stage_rig, reads = self.hair.stage_rig, self.model.training.get("reads")
+        names, notes = [leaf(name) for name in stage_rig.joints.names], []
         for name in self.model.spec.pose_joints if isinstance(reads, dict) else ():
-            now, trained = names[source.character.humanoid.nearest(name)], reads.get(name)
+            now, trained = names[stage_rig.character.humanoid.nearest(name)], reads.get(name)
             if trained != now and trained in names:
                 notes.append(
-                    f"{source.path}: '{now}' is read as {name}, but in training '{trained}' was, which is here, too; check "
+                    f"{stage_rig.path}: '{now}' is read as {name}, but in training '{trained}' was, which is here, too; check "
                     f"--joint {name}={trained}"
                 )
         return notes
@@ -172,39 +174,39 @@ class BoundHair:
         if self.size == 1:
             return []
         return [
-            f"{self.hair.source.source.path}: is {self.size:.2f} times as large as the character that the model was trained for; its "
+            f"{self.hair.stage_rig.joints.path}: is {self.size:.2f} times as large as the character that the model was trained for; its "
             "hair swings as fast as that one's"
         ]
 
 
 def _likelier(hair: RiggedHair, model: RigModel) -> list[str]:
     """What more likely explains that a model does not fit than another rig: a character that lies, or another head joint."""
-    source, reads = hair.source, model.training.get("reads")
+    stage_rig, reads = hair.stage_rig, model.training.get("reads")
     trained = reads.get("head") if isinstance(reads, dict) else None
-    head = leaf(source.source.names[source.character.head])
-    if trained != head and trained in map(leaf, source.source.names):
+    head = leaf(stage_rig.joints.names[stage_rig.character.head])
+    if trained != head and trained in map(leaf, stage_rig.joints.names):
         return [f"but in training the head was '{trained}', and here it is '{head}': check --head first"]
-    return [f"but first: {note}" for note in lies_down(source)]
+    return [f"but first: {note}" for note in lies_down(stage_rig)]
 
 
 def _with_samples(hair: RiggedHair, wanted: list[float]) -> list[float]:
     """Time codes that were asked for and those at which the animation, or hair of an earlier bake that stays, has rotations."""
-    source = hair.source.source
+    source = hair.stage_rig.joints
     read = [source.animation] + [source.copied] * bool(kept_hair(source, hair.rig.chains.joints))
     attributes = [UsdSkel.Animation(prim).GetRotationsAttr() for prim in read if prim]
     own = sorted({code for attribute in attributes for code in attribute.GetTimeSamples()})
     # A frame and a sample at the same time, up to rounding, are one.
     edges = np.array([-np.inf, *own, np.inf])
     after = np.searchsorted(edges, wanted)
-    near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= SAME * hair.source.border.frame
+    near = np.minimum(edges[after] - wanted, wanted - edges[after - 1]) <= SAME * hair.stage_rig.border.frame
     return sorted({*np.array(wanted)[~near].tolist(), *own})
 
 
 def _outdated(hair: RiggedHair) -> list[str]:
     """Joints of other hair that an earlier bake moves as the animation was then."""
-    source = hair.source.source
+    source = hair.stage_rig.joints
     kept = kept_hair(source, hair.rig.chains.joints)
-    if kept and not hair.source.outdated:
+    if kept and not hair.stage_rig.outdated:
         former = outdated_of(source.copied)
         return [name for name in kept if name in former]
     return list(kept)

@@ -107,13 +107,13 @@ def evaluate_rig(
     """
     hair = read_rigged_hair(baked, skeleton=skeleton, head=head, chains=chains, joints=joints, baked_first=True)
     check_patterns(hair, chains)
-    rig, source, say = hair.rig, hair.source, progress or silent
+    rig, stage_rig, say = hair.rig, hair.stage_rig, progress or silent
     if not len(rig.points):
         raise NeuralocksError(
-            f"{source.path}: no mesh that is shown is skinned to its hair joints; there is nothing to measure"
+            f"{stage_rig.path}: no mesh that is shown is skinned to its hair joints; there is nothing to measure"
         )
-    if len(source.time_codes) < 2:
-        raise NeuralocksError(f"{source.path}: is not animated; give a bake, or an animated character")
+    if len(stage_rig.time_codes) < 2:
+        raise NeuralocksError(f"{stage_rig.path}: is not animated; give a bake, or an animated character")
     moving = moving_joints(rig.character.skeleton, rig.chains)
     some = np.flatnonzero(_hair_vertices(hair, moving))
     picked = np.linspace(0, len(some) - 1, min(len(some), VERTICES)).round().astype(int)
@@ -122,14 +122,14 @@ def evaluate_rig(
     off, jitter, seen, deep = _moved(posed, moving, say)
     each = {i: float(np.sqrt(off[lock == i].mean())) for i in np.unique(lock)}
     most = max(each, key=each.__getitem__)
-    wind = source.source.animation and recorded_wind(source.source.animation, source.border)
+    wind = stage_rig.joints.animation and recorded_wind(stage_rig.joints.animation, stage_rig.border)
     if wind and wind.gusts:  # no hair comes to rest
         jitter = float("nan")
     measures = {
         "joints": len(rig.chains),
         "chains": len(rig.chains.roots),
         "vertices": len(vertices),
-        "frames": len(source.time_codes),
+        "frames": len(stage_rig.time_codes),
         "swing_mm": 1e3 * float(np.sqrt(off.mean())),
         "swing_most": rig.chains.chain_name(int(most)),
         "swing_most_mm": 1e3 * each[most],
@@ -137,16 +137,16 @@ def evaluate_rig(
     }
     if rig.character.body is not None:
         measures |= _depths(posed, seen, deep, [rig.chains.chain_name(int(i)) for i in lock], say)
-    notes = rigged_notes(source) + chain_notes(hair, chains) + _not_measured(hair)
-    return RigCard(Path(baked), source.path, measures, notes)
+    notes = rigged_notes(stage_rig) + chain_notes(hair, chains) + _not_measured(hair)
+    return RigCard(Path(baked), stage_rig.path, measures, notes)
 
 
 class _Posed:
     """Some vertices of the hair, and the skin, as the animation poses them, in canonical space [m]."""
 
     def __init__(self, hair: RiggedHair, vertices: np.ndarray, moving: np.ndarray):
-        self.codes, self.clip = hair.source.time_codes, hair.source.clip
-        self._character, self.skin = hair.source.character, hair.rig.character.body
+        self.codes, self.clip = hair.stage_rig.time_codes, hair.stage_rig.clip
+        self._character, self.skin = hair.stage_rig.character, hair.rig.character.body
         self._moving = moving
         self._hair = self._character.body.part(vertices, np.zeros((0, 3), int))
         self.at_rest = self._character.canonical(self._hair.points)
@@ -235,7 +235,7 @@ def _not_measured(hair: RiggedHair) -> list[str]:
 
 def _hair_vertices(hair: RiggedHair, moving: np.ndarray) -> np.ndarray:
     """Which vertices (V,) of all meshes the hair joints move, in the order of `HairRig.points`."""
-    return np.concatenate([mesh.weight_on(moving) > LEAST_WEIGHT for mesh in core_meshes(hair.source)])
+    return np.concatenate([mesh.weight_on(moving) > LEAST_WEIGHT for mesh in core_meshes(hair.stage_rig)])
 
 
 def _stiff(character: Character, joints: np.ndarray, moving: np.ndarray) -> np.ndarray:

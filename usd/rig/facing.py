@@ -11,7 +11,7 @@ ASKEW = 2.0
 
 def askew_notes(rig: StageRig) -> list[str]:
     """The note on a bind pose that faces askew: the network's axes follow from where left and right are."""
-    character, names = rig.character, rig.source.names
+    character, names = rig.character, rig.joints.names
     if character.sides is None:
         return []
     angle = character.facing_angle

@@ -61,7 +61,7 @@ def write_rig_layer(characters: list[MovedHair], shot: Path, out: Path, facts: d
     """
     layer, hair = Sdf.Layer.CreateAnonymous(out.suffix), characters[0].hair
     codes = sorted({code for character in characters for code in character.codes})
-    write_header(layer, hair.stage, hair.source.border, shot, out, codes)
+    write_header(layer, hair.stage, hair.stage_rig.border, shot, out, codes)
     paths = [_write_animation(layer, character) for character in characters]
     for path in paths:
         record(layer.GetPrimAtPath(path), facts)
@@ -70,7 +70,7 @@ def write_rig_layer(characters: list[MovedHair], shot: Path, out: Path, facts: d
 
 
 def _write_animation(layer: Sdf.Layer, character: MovedHair) -> str:
-    hair, joints, source = character.hair, character.joints, character.hair.source.source
+    hair, joints, source = character.hair, character.joints, character.hair.stage_rig.joints
     prim = _animation_spec(layer, hair)
     own = _usable_animation(source)
     order = [str(name) for name in own.GetJointsAttr().Get()] if own else []
@@ -125,7 +125,7 @@ def kept_hair(source: JointSource, joints: np.ndarray) -> dict[str, int]:
 
 def _animation_spec(layer: Sdf.Layer, hair: RiggedHair) -> Sdf.PrimSpec:
     """A new SkelAnimation below the skeleton, and the skeleton bound to it."""
-    source = hair.source.source
+    source = hair.stage_rig.joints
     over = over_prim(layer, source.prim)
     apply_binding(over, source.prim)
     relation = Sdf.RelationshipSpec(over, "skel:animationSource", custom=False)

@@ -19,39 +19,53 @@ RIG_JOINTS = rig_spec().pose_joints
 """Semantic joints that rig models read besides the head."""
 
 
-def rigged_notes(source: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
+def rigged_notes(stage_rig: StageRig, pose_joints=RIG_JOINTS) -> list[str]:
     """What a user should know about a character with hair on joints.
 
     Args:
-        source: the character.
+        stage_rig: the character.
         pose_joints: semantic joints that the network reads besides the head.
     """
-    found = [*unfound(source, pose_joints), *unlikely_head(source), *another_head(source), *lies_down(source)]
-    frames = source.border.frame_notes(source.path)
-    return [*source.notes, *frames, *weight_notes(source), *askew_notes(source), *outside_notes(source), *found]
+    found = [
+        *unfound(stage_rig, pose_joints),
+        *unlikely_head(stage_rig),
+        *another_head(stage_rig),
+        *lies_down(stage_rig),
+    ]
+    frames = stage_rig.border.frame_notes(stage_rig.path)
+    return [
+        *stage_rig.notes,
+        *frames,
+        *weight_notes(stage_rig),
+        *askew_notes(stage_rig),
+        *outside_notes(stage_rig),
+        *found,
+    ]
 
 
 def chain_notes(hair: RiggedHair, patterns: list[str] | None) -> list[str]:
     """What a user should know about automatically chosen chains; those chosen by patterns are the user's own."""
-    return [] if patterns else left_out_notes(hair.source, core_meshes(hair.source), hair.rig.chains)
+    return [] if patterns else left_out_notes(hair.stage_rig, core_meshes(hair.stage_rig), hair.rig.chains)
 
 
-def mirrored_notes(source: StageRig, chains: HairChains) -> list[str]:
+def mirrored_notes(stage_rig: StageRig, chains: HairChains) -> list[str]:
     """Which hair joint, or joint that carries one, the animation mirrors; what hangs from it is mirrored alike."""
-    joints = np.unique(np.concatenate([chains.joints, source.source.parents[chains.joints]]))
-    flipped = (np.linalg.det(source.clip.joints[:, joints, :3, :3]) < 0).any(axis=0)
+    joints = np.unique(np.concatenate([chains.joints, stage_rig.joints.parents[chains.joints]]))
+    flipped = (np.linalg.det(stage_rig.clip.joints[:, joints, :3, :3]) < 0).any(axis=0)
     if not flipped.any():
         return []
-    name = leaf(source.source.names[joints[np.argmax(flipped)]])
-    return [f"{source.path}: hair joint '{name}' is mirrored by its animation; remove the negative scale"]
+    name = leaf(stage_rig.joints.names[joints[np.argmax(flipped)]])
+    return [f"{stage_rig.path}: hair joint '{name}' is mirrored by its animation; remove the negative scale"]
 
 
-def offset_notes(source: StageRig, chains: HairChains) -> list[str]:
+def offset_notes(stage_rig: StageRig, chains: HairChains) -> list[str]:
     """The note on joints between hair joints that the animation moves, since hair then moves with them besides its turns."""
-    found = [leaf(source.source.names[joint]) for joint in moved_between(chains, source.character, source.clip)]
+    found = [
+        leaf(stage_rig.joints.names[joint]) for joint in moved_between(chains, stage_rig.character, stage_rig.clip)
+    ]
     if not found:
         return []
     what, they = f"'{found[0]}' is animated and moves", "its keys"
     if found[1:]:
         what, they = f"'{found[0]}' and {len(found) - 1} more are animated and move", "their keys"
-    return [f"{source.path}: {what} hair besides the network; clear {they} unless that is wanted"]
+    return [f"{stage_rig.path}: {what} hair besides the network; clear {they} unless that is wanted"]

@@ -21,12 +21,12 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
     Raises:
         NeuralocksError: the skeleton skins no mesh.
     """
-    source, character = rigged.source, rigged.source.character
+    stage_rig, character = rigged.stage_rig, rigged.stage_rig.character
     if character.body is None:
         raise NeuralocksError(
-            f"{source.path}: it skins no mesh that is shown, so there is nothing to draw; show it, or bind the hair to it"
+            f"{stage_rig.path}: it skins no mesh that is shown, so there is nothing to draw; show it, or bind the hair to it"
         )
-    body, clip = with_parts(character.body, rigged.elsewhere), source.clip
+    body, clip = with_parts(character.body, rigged.elsewhere), stage_rig.clip
     hair = np.zeros(len(body.points), bool)
     own = _hair(rigged)
     hair[: len(own)] = own
@@ -51,9 +51,12 @@ def rigged_scene(rigged: RiggedHair) -> Scene:
 
 def _hair(rigged: RiggedHair) -> np.ndarray:
     """Which vertices (V,) of the skeleton's own meshes are hair."""
-    meshes, moving = core_meshes(rigged.source), moving_joints(rigged.source.character.skeleton, rigged.rig.chains)
+    meshes, moving = (
+        core_meshes(rigged.stage_rig),
+        moving_joints(rigged.stage_rig.character.skeleton, rigged.rig.chains),
+    )
     result = [np.zeros(0, bool)]
-    for mesh, (skin, _) in zip(meshes, parted(rigged.source.character, meshes, moving)):
+    for mesh, (skin, _) in zip(meshes, parted(rigged.stage_rig.character, meshes, moving)):
         hair = np.ones(len(mesh.points), bool)
         hair[skin] = False
         result.append(hair)

@@ -47,14 +47,14 @@ class RiggedHair:
 
     Attributes:
         stage: the shot.
-        source: skeleton, body and clip as read.
+        stage_rig: skeleton, body and clip as read.
         rig: hair and body, separated.
         others: other skeletons with hair chains, from which this one was chosen.
         elsewhere: parts of the character that other skeletons skin, on this one's joints.
     """
 
     stage: Usd.Stage = field(repr=False)
-    source: StageRig = field(repr=False)
+    stage_rig: StageRig = field(repr=False)
     rig: HairRig = field(repr=False)
     others: tuple[str, ...] = ()
     elsewhere: tuple[Body, ...] = field(default=(), repr=False)
@@ -62,7 +62,7 @@ class RiggedHair:
     @property
     def path(self) -> str:
         """The Skeleton prim."""
-        return self.source.path
+        return self.stage_rig.path
 
 
 class _Unusable(NamedTuple):
@@ -88,14 +88,14 @@ def read_rigged_hair(path: str | Path, *, baked_first: bool = False, **options) 
     """
     found, _ = read_rigged_hairs(path, as_baked=baked_first, **options)
     if baked_first:
-        found.sort(key=lambda hair: (not is_baked(hair.source), hair.source.character.body is None))
-        found = [replace(found[0], others=tuple(hair.source.path for hair in found[1:]))]
+        found.sort(key=lambda hair: (not is_baked(hair.stage_rig), hair.stage_rig.character.body is None))
+        found = [replace(found[0], others=tuple(hair.stage_rig.path for hair in found[1:]))]
     if len(found) > 1:
-        few = ", ".join(hair.source.path for hair in found[:_FEW]) + (", ..." if len(found) > _FEW else "")
+        few = ", ".join(hair.stage_rig.path for hair in found[:_FEW]) + (", ..." if len(found) > _FEW else "")
         raise NeuralocksError(
             f"{path}: {len(found)} skeletons have hair chains ({few}); choose one with --skeleton PRIM"
         )
-    check_orients(found[0].source, found[0].rig.chains)
+    check_orients(found[0].stage_rig, found[0].rig.chains)
     return found[0]
 
 
@@ -140,39 +140,41 @@ def read_rigged_hairs(
     given = {"all_shapes": all_shapes, "joints": joints, "cuts": cuts, "unbaked": unbaked}
     found, errors, bare, skins = [], [], [], find_skins(stage)
     for prim in prims:
-        source = None
+        stage_rig = None
         try:
             check_authored(prim)
-            source = read_rig(stage, prim, border, head, skins=skins, **given)
-            with names_uneven_prims(source):
-                wanted = chains or (of_bake(source) if as_baked else None)
-                wanted = wanted if model is None else _of_model(model, source.character)
-                rig = assemble_rig(source.character, core_meshes(source), wanted)
+            stage_rig = read_rig(stage, prim, border, head, skins=skins, **given)
+            with names_uneven_prims(stage_rig):
+                wanted = chains or (of_bake(stage_rig) if as_baked else None)
+                wanted = wanted if model is None else _of_model(model, stage_rig.character)
+                rig = assemble_rig(stage_rig.character, core_meshes(stage_rig), wanted)
             if model is not None:  # otherwise it is checked for the chosen one
-                check_orients(source, rig.chains)
+                check_orients(stage_rig, rig.chains)
         except NeuralocksError as error:
             check()  # the error may come from a stop by the user
-            bare += [] if source is None else [source]
+            bare += [] if stage_rig is None else [stage_rig]
             error = reworded(error, _with_path(prim, error))
             errors.append(_Unusable(str(prim.GetPath()), _is_hairy(prim, model), error))
             continue
-        found.append(RiggedHair(stage, source, rig))
+        found.append(RiggedHair(stage, stage_rig, rig))
     # Hair may have its own skeleton besides the body's; the error should not be that the body's has no hair.
     hairy = [each for each in errors if each.hairy]
     if not found:
         raise (hairy or errors)[0].error from None
     if model is None:
-        others = bare if skeleton is None else Others([hair.source for hair in found], stage, head, joints).maybe_same()
+        others = (
+            bare if skeleton is None else Others([hair.stage_rig for hair in found], stage, head, joints).maybe_same()
+        )
         found = _on_whole_bodies(found, others)
     return found, [of_skeleton(each.path, each.error) for each in hairy]
 
 
 def _on_whole_bodies(found: list[RiggedHair], others: list[StageRig]) -> list[RiggedHair]:
     """Hair that may touch all meshes of its character, which may be in several skeletons; the hair of these is no body."""
-    hairless, result = [replace(hair.source, character=hair.rig.character) for hair in found], []
+    hairless, result = [replace(hair.stage_rig, character=hair.rig.character) for hair in found], []
     for hair, own in zip(found, hairless):
         parts, left = parts_elsewhere(own, [*hairless, *others])
-        hair.source.notes.extend(partial_body(own, left))
+        hair.stage_rig.notes.extend(partial_body(own, left))
         rig = hair.rig.with_body(with_parts(own.character.body, parts))
         result.append(replace(hair, rig=rig, elsewhere=tuple(parts)))
     return result
@@ -205,23 +207,23 @@ def _of_model(model: HairChains, character: Character) -> HairChains:
     return placed_chains(chains, character)
 
 
-def of_bake(source: StageRig) -> list[str] | None:
+def of_bake(stage_rig: StageRig) -> list[str] | None:
     """Patterns for the joints that a rig bake moves; None if it is no bake, or one of a rig with other joints."""
-    hair, names = set(source.source.baked_hair), source.source.names
+    hair, names = set(stage_rig.joints.baked_hair), stage_rig.joints.names
     if not hair or not hair <= set(names):
         return None
     return [escape(name) for name in names if name in hair]
 
 
-def is_baked(source: StageRig) -> bool:
+def is_baked(stage_rig: StageRig) -> bool:
     """Whether the animation of a skeleton is one that `rig bake` wrote."""
-    animation = source.source.animation
+    animation = stage_rig.joints.animation
     return animation is not None and animation.GetName() == BAKED
 
 
-def core_meshes(source: StageRig) -> list[Body]:
+def core_meshes(stage_rig: StageRig) -> list[Body]:
     """The skinned meshes of a skeleton in the core's axes and metres, in the order of the merged body."""
-    return [Body(*mesh.in_bind(source.to_bind), mesh.indices, mesh.weights) for mesh in source.meshes]
+    return [Body(*mesh.in_bind(stage_rig.to_bind), mesh.indices, mesh.weights) for mesh in stage_rig.meshes]
 
 
 def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:
@@ -230,10 +232,10 @@ def check_patterns(hair: RiggedHair, patterns: list[str] | None) -> None:
     Raises:
         NeuralocksError: names it.
     """
-    character, joints = hair.source.character, hair.rig.chains.joints
+    character, joints = hair.stage_rig.character, hair.rig.chains.joints
     above = [j for j in np.flatnonzero(character.of_head) if character.skeleton.below(j)[joints].any()]
     for pattern in patterns or ():
-        if not any(fits(hair.source.source.names[joint], pattern) for joint in above):
+        if not any(fits(hair.stage_rig.joints.names[joint], pattern) for joint in above):
             raise NeuralocksError(
                 f"--chains {pattern}: no joint of the hair has such a name; see neuralocks inspect for their names"
             )
@@ -251,24 +253,24 @@ def check_authored(prim: Usd.Prim) -> None:
         raise NeuralocksError(f"{prim.GetPath()}: it has no bindTransforms; export the skeleton with its bind pose")
 
 
-def check_orients(source: StageRig, chains: HairChains) -> None:
+def check_orients(stage_rig: StageRig, chains: HairChains) -> None:
     """The core works on orients without scale and mirroring; joint rotations can only be written if orients are not mirrored.
 
     Raises:
         NeuralocksError: names the joint.
     """
-    bind, names = source.source.bind, source.source.names
-    for joint in np.unique(np.concatenate([chains.joints, np.maximum(source.source.parents[chains.joints], 0)])):
+    bind, names = stage_rig.joints.bind, stage_rig.joints.names
+    for joint in np.unique(np.concatenate([chains.joints, np.maximum(stage_rig.joints.parents[chains.joints], 0)])):
         linear = bind[joint, :3, :3]
         name = leaf(names[joint])
-        if np.linalg.det(linear) * np.linalg.det(bind[source.character.head, :3, :3]) < 0:
+        if np.linalg.det(linear) * np.linalg.det(bind[stage_rig.character.head, :3, :3]) < 0:
             raise NeuralocksError(
-                f"{source.path}: joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"
+                f"{stage_rig.path}: joint '{name}' is mirrored in bind pose (negative scale); apply the scale in the rig"
             )
         scale = np.linalg.norm(linear, axis=0)
         if scale.max() > UNEVEN * scale.min():
             raise NeuralocksError(
-                f"{source.path}: joint '{name}' is unevenly scaled in bind pose; apply the scale in the rig"
+                f"{stage_rig.path}: joint '{name}' is unevenly scaled in bind pose; apply the scale in the rig"
             )
 
 

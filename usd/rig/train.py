@@ -76,9 +76,11 @@ def train_rig(
     check_patterns(hair, chains)
     if former:
         former.check(hair.rig.chains)
-    notes = rigged_notes(hair.source) + chain_notes(hair, chains)
+    notes = rigged_notes(hair.stage_rig) + chain_notes(hair, chains)
     if hair.rig.character.body is None:
-        notes.append(f"{hair.source.path}: it skins no body mesh; the hair is trained without anything to collide with")
+        notes.append(
+            f"{hair.stage_rig.path}: it skins no body mesh; the hair is trained without anything to collide with"
+        )
     if tell:
         tell(notes)
     values = RigMaterial(**(former.material() if former else {}) | material)
@@ -94,7 +96,7 @@ def train_rig(
 
     def write(model) -> None:
         nonlocal written
-        model.training.update(_card(hair.source.character, model, character.name))
+        model.training.update(_card(hair.stage_rig.character, model, character.name))
         if former:
             model.training["began with"] = former.card()
         if command := command_line():

@@ -14,16 +14,16 @@ from ..skel.stage_rig import StageRig
 
 
 @contextmanager
-def names_uneven_prims(source: StageRig) -> Iterator[None]:
+def names_uneven_prims(stage_rig: StageRig) -> Iterator[None]:
     """Turns an error about a joint that is scaled unevenly into one that names the prim above, if that has the scale."""
     try:
         yield
     except UnevenJoint:
-        placed = source.source.placement
+        placed = stage_rig.joints.placement
         if not _uneven(placed.reference):
             raise
         raise NeuralocksError(
-            f"{source.path}: {placed.whose(_uneven)} is scaled unevenly, and hair joints below it cannot be; "
+            f"{stage_rig.path}: {placed.whose(_uneven)} is scaled unevenly, and hair joints below it cannot be; "
             "scale it evenly, or apply its scale to skeleton and meshes"
         ) from None
 

@@ -29,8 +29,8 @@ def one_of_alike(prim: Usd.Prim, seats: list[Seat], notes: list[str]) -> Seat:
     Raises:
         NeuralocksError: several are equally likely.
     """
-    kin = max(kinship(prim, seat.rig.source.prim) for seat in seats)
-    likely = _sharing_a_name(prim, [seat for seat in seats if kinship(prim, seat.rig.source.prim) == kin])
+    kin = max(kinship(prim, seat.rig.joints.prim) for seat in seats)
+    likely = _sharing_a_name(prim, [seat for seat in seats if kinship(prim, seat.rig.joints.prim) == kin])
     best = min(likely, key=lambda seat: (seat.way, seat.distance))
     others = [seat for seat in likely if seat is not best and not one_person(best.rig, seat.rig)]
     near = CLEARLY * best.distance + 1e-4
@@ -66,7 +66,7 @@ def one_person(rig: StageRig, other: StageRig) -> bool:
 def _sharing_a_name(prim: Usd.Prim, seats: list[Seat]) -> list[Seat]:
     """Those on a skeleton whose path shares most names with the groom's."""
     own = _names(prim.GetPath())
-    shared = [len(own & _names(seat.rig.source.prim.GetPath())) for seat in seats]
+    shared = [len(own & _names(seat.rig.joints.prim.GetPath())) for seat in seats]
     return [seat for seat, count in zip(seats, shared, strict=True) if count == max(shared)]
 
 

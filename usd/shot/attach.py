@@ -72,7 +72,7 @@ class Attachment:
     @property
     def joint(self) -> str:
         """Path of the carrying joint."""
-        return self.rig.source.names[self.character.carrying_joint]
+        return self.rig.joints.names[self.character.carrying_joint]
 
     @property
     def off_head(self) -> bool:
@@ -115,7 +115,7 @@ def attach(
     beyond = beyond_ends(prim)
     found = replace(found, drawn=begins_where_drawn(prim, found.rig, found.to_bind, beyond))
     notes += not_pinned(prim, found.rig, found.drawn, beyond)
-    name = found.rig.source.names[found.character.head]
+    name = found.rig.joints.names[found.character.head]
     asked = found.rig.by_hand.get("head")
     if asked and leaf(name) != leaf(asked):
         option = "--head " if head else "--joint head="
@@ -132,9 +132,9 @@ def _between_binds(prim: Usd.Prim, rig: StageRig, placement: Placement) -> np.nd
         return np.eye(4)
     skeleton = prim.GetStage().GetPrimAtPath(rig.path)
     theirs = JointSource(skeleton) if skeleton and skeleton.IsA(UsdSkel.Skeleton) else None
-    if theirs is None or theirs.names != rig.source.names:
+    if theirs is None or theirs.names != rig.joints.names:
         return placement.brought
-    ours, places = rig.source.bind[:, :3, 3], theirs.bind[:, :3, 3]
+    ours, places = rig.joints.bind[:, :3, 3], theirs.bind[:, :3, 3]
     ways = (np.eye(4), placement.brought)
     return min(ways, key=lambda way: np.abs(transformed(places, way) - ours).max())
 
@@ -148,10 +148,10 @@ def bound_joint(prim: Usd.Prim, rig: StageRig, placement: Placement, seated: boo
     """
     if bound_skeleton(prim) == rig.path:
         joint = _by_own_binding(prim, rig, rig.to_bind @ geom_bind(prim))[0]
-        return rig.source.names[joint], str(prim.GetPath())
+        return rig.joints.names[joint], str(prim.GetPath())
     if seated and (seat := find_seat(prim, rig, placement, NEAR)) is not None:
         seat, _ = _of_roots(prim, seat, placement)
-        return rig.source.names[_by_seat(seat)[0]], str(seat.mesh.prim.GetPath())
+        return rig.joints.names[_by_seat(seat)[0]], str(seat.mesh.prim.GetPath())
     return None
 
 
@@ -201,7 +201,7 @@ def _on_mesh(prim: Usd.Prim, seats: list[Seat], placement: Placement, notes: lis
         how = f"{why} (binding of {mesh.prim.GetPath()}, on which it sits)"
     else:
         joint, to_bind = followed
-        how = f"joint '{rig.source.names[joint]}' (which its own transform follows)"
+        how = f"joint '{rig.joints.names[joint]}' (which its own transform follows)"
     notes += [*turned, *spread, *unsure(prim, seat, placement)]
     at_default = ways(rig, mesh, placement)[0] if moved else None
     return Attachment(rig, carried_by(rig, joint), to_bind, how, at_default, told=bool(spread), turned=turned)
@@ -237,7 +237,7 @@ def _by_name(prim: Usd.Prim, rigs: list[StageRig], placement: Placement, head: s
     to_bind = next(way for way in places[rig.path] if away(rig, way) <= max(CLEARLY * nearest, 1e-3))
     at_default = None if when is None else ways(rig, None, placement)[0]
     why = "named with --head" if head else rig.character.humanoid.reasons.get("head", "named like a head")
-    how = f"joint '{rig.source.names[rig.character.head]}' ({why})"
+    how = f"joint '{rig.joints.names[rig.character.head]}' ({why})"
     return Attachment(rig, rig.character, to_bind, how, at_default, far)
 
 
@@ -247,8 +247,8 @@ def _nearest(prim: Usd.Prim, able: list[tuple[float, StageRig]]) -> list[tuple[f
     """
     least = min(distance for distance, _ in able)
     close = [(distance, rig) for distance, rig in able if distance <= 2 * least]
-    kin = max(kinship(prim, rig.source.prim) for _, rig in close)
-    return [(distance, rig) for distance, rig in close if kinship(prim, rig.source.prim) == kin]
+    kin = max(kinship(prim, rig.joints.prim) for _, rig in close)
+    return [(distance, rig) for distance, rig in close if kinship(prim, rig.joints.prim) == kin]
 
 
 def _away(roots: np.ndarray, character: Character, to_bind: np.ndarray) -> float:
@@ -273,7 +273,7 @@ def _by_own_binding(prim: Usd.Prim, rig: StageRig, to_bind: np.ndarray) -> tuple
 
     Points farther down are weighted as a rigger wants them to move without simulation, with the chest or an arm.
     """
-    indices, weights = joint_influences(prim, len(rest_points(prim)), rig.source)
+    indices, weights = joint_influences(prim, len(rest_points(prim)), rig.joints)
     turned = upside_down(prim, rig, to_bind)
     roots = ends(prim, last=bool(turned))
     shares = joint_shares(rig, indices[roots], weights[roots])

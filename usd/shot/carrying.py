@@ -23,7 +23,7 @@ MOST = 0.75
 
 def carrying_joint(rig: StageRig, shares: np.ndarray, exact: bool = False) -> tuple[int, str]:
     """The joint that carries, and why: the head if most of the skin follows it or a joint below it."""
-    names = rig.source.names
+    names = rig.joints.names
     best = int(shares.argmax())
     head = rig.character.humanoid.get("head")
     if head is not None and best != head:
@@ -64,7 +64,7 @@ def _still(places: np.ndarray) -> bool:
 
 def joint_shares(rig: StageRig, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Share (J,) of each joint in these influences."""
-    shares = np.bincount(indices.ravel(), weights.ravel(), len(rig.source.names))
+    shares = np.bincount(indices.ravel(), weights.ravel(), len(rig.joints.names))
     return shares / max(shares.sum(), 1e-12)
 
 
@@ -90,7 +90,7 @@ def _carried_by(rig: StageRig, joint: int) -> Character:
 
 def spread_over(rig: StageRig, path: str, joint: int, shares: np.ndarray) -> list[str]:
     """The note on hair that one joint cannot carry: fur all over a body."""
-    names = [leaf(name) for name in rig.source.names]
+    names = [leaf(name) for name in rig.joints.names]
     # Joints below a head are its face; joints below a spine are everything.
     own = rig.character.of_head if joint == rig.character.humanoid.get("head") else np.arange(len(names)) == joint
     share = shares[own].sum()

@@ -37,8 +37,8 @@ def lies_down(rig: StageRig) -> list[str]:
     """The note on a character that lies down in its bind pose, as one does whose up axis is not its stage's."""
     character = rig.character
     lying, sure = lies(character.skeleton.bind[:, :3, 3], character.humanoid, np.array([0.0, 1.0, 0.0]))
-    foreign = rig.border.foreign(rig.source.prim.GetAttribute("bindTransforms"), axis_only=True)
-    unsaid = not rig.source.prim.GetStage().HasAuthoredMetadata(UsdGeom.Tokens.upAxis)
+    foreign = rig.border.foreign(rig.joints.prim.GetAttribute("bindTransforms"), axis_only=True)
+    unsaid = not rig.joints.prim.GetStage().HasAuthoredMetadata(UsdGeom.Tokens.upAxis)
     if not lying or not (sure or foreign or unsaid):
         return []
     up = rig.border.up_axis
@@ -46,10 +46,10 @@ def lies_down(rig: StageRig) -> list[str]:
     return [f"{rig.path}: lies down in its bind pose, so its hair is taken to hang sideways{foreign or f'; {guess}'}"]
 
 
-def weight_notes(source: StageRig) -> list[str]:
+def weight_notes(rig: StageRig) -> list[str]:
     """What is wrong with authored weights of a character's skin: reading makes them sum to one, and UsdSkel does not."""
     notes = []
-    for mesh in source.meshes:
+    for mesh in rig.meshes:
         primvar = UsdSkel.BindingAPI(mesh.prim).GetJointWeightsPrimvar()
         values = np.asarray(rest_primvar(primvar) if primvar and primvar.HasValue() else [], float)
         size = max(int(primvar.GetElementSize()), 1) if len(values) else 1
@@ -58,7 +58,7 @@ def weight_notes(source: StageRig) -> list[str]:
         path, total = mesh.prim.GetPath(), values.reshape(-1, size).sum(axis=1)
         free, off = total < 1e-9, np.abs(total - 1) > 0.01
         if free.any():
-            first = leaf(source.source.names[mesh.indices[int(free.argmax()), 0]])
+            first = leaf(rig.joints.names[mesh.indices[int(free.argmax()), 0]])
             notes.append(
                 f"{path}: {int(free.sum())} of {len(free)} vertices have no weights and are read as bound to the "
                 f"first joint that they name, such as '{first}'; bind them in the rig"
@@ -96,7 +96,7 @@ def unevenly_scaled(rig: StageRig) -> list[str]:
     if ratio[frame] < UNEVEN:
         return []
     code = rig.time_codes[frame]
-    placed, joint = rig.source.placement, leaf(rig.source.names[rig.character.carrying_joint])
+    placed, joint = rig.joints.placement, leaf(rig.joints.names[rig.character.carrying_joint])
     what = placed.whose(uneven, code) if uneven(placed.at(code)) else f"joint '{joint}'"
     much = f"by {ratio[frame] - 1:.0%} more along one axis than"
     if ratio[frame] >= FLATTENED:
@@ -130,7 +130,7 @@ def without_body(rigs: Sequence[StageRig], others: Sequence[StageRig]) -> list[s
     bare = [rig for rig in rigs if rig.character.body is None and not any(parts_elsewhere(rig, others))]
     if not bare:
         return []
-    hidden, loose = _unused_meshes(bare[0].source.prim.GetStage())
+    hidden, loose = _unused_meshes(bare[0].joints.prim.GetStage())
     return [
         f"{rig.path}: moves no visible mesh, so hair is kept out of no body and moves as on an average head; "
         f"{_meant(hidden.get(rig.path, []), loose, rig) or 'bind its mesh to it'}"

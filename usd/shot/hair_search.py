@@ -233,4 +233,4 @@ class HairSearch:
     @cached_property
     def _unread(self) -> list[Unusable]:
         rigs = self._every
-        return find_unusable(rigs[0].source.prim.GetStage(), {rig.path for rig in rigs})
+        return find_unusable(rigs[0].joints.prim.GetStage(), {rig.path for rig in rigs})

@@ -132,7 +132,7 @@ def few(lines: list[str], others: str = "prims are left out like that") -> list[
 
 def not_animated(rig: StageRig) -> str:
     """Why a skeleton cannot be baked; if UsdSkel ignores its animation, also what is wrong with the animation."""
-    ignored = rig.source.ignored
+    ignored = rig.joints.ignored
     why = f" ({ignored.split(': ', 1)[1].split(';')[0]})" if ignored else ""
     return (
         f"{rig.path}: the skeleton has no animation{why}; bind a SkelAnimation to it (skel:animationSource), or let a wind "
@@ -144,7 +144,7 @@ def rig_notes(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
     """The notes on a held pose and on poses that are held for some frames, on joints that were not recognized by name and on a
     head of an unlikely size.
     """
-    held = rig.source.animated and len(rig.time_codes) == 1
+    held = rig.joints.animated and len(rig.time_codes) == 1
     notes = [f"{rig.path}: the animation has one sample, so the body holds one pose"] if held else []
     return notes + on_twos(rig, joints) + unfound(rig, joints) + unlikely_head(rig)
 
@@ -170,9 +170,9 @@ def unfound(rig: StageRig, joints=POSE_JOINTS) -> list[str]:
     if not missing:
         return _without_elbow(rig, joints)
     head = rig.character.humanoid.get("head")
-    if head is not None and rig.source.parents[head] < 0:
+    if head is not None and rig.joints.parents[head] < 0:
         return [
-            f"{rig.path}: nothing carries its head joint '{rig.source.names[head]}', so hair does not feel how neck and body "
+            f"{rig.path}: nothing carries its head joint '{rig.joints.names[head]}', so hair does not feel how neck and body "
             "turn against it; export it with the body's skeleton as one"
         ]
     return [
@@ -199,14 +199,14 @@ def unlikely_head(rig: StageRig) -> list[str]:
     width = rig.character.head_width
     if width is None or HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
         return []
-    foreign = rig.border.foreign(rig.source.prim.GetAttribute("bindTransforms"))
+    foreign = rig.border.foreign(rig.joints.prim.GetAttribute("bindTransforms"))
     remedy = foreign or f"; check the stage's metersPerUnit ({rig.border.metres_per_unit:g})"
     return [f"{rig.path}: the head is {width:.3g} m wide{remedy}"]
 
 
 def another_head(rig: StageRig) -> list[str]:
     """The note on hair joints of a second character in the skeleton, if no bake moves them."""
-    names, character, moved = rig.source.names, rig.character, rig.source.baked_hair
+    names, character, moved = rig.joints.names, rig.character, rig.joints.baked_hair
     for joint in np.flatnonzero(~character.of_head):
         heads = heads_above(character, joint)
         if heads and says_hair(character.own_names[joint]) and names[joint] not in moved:
@@ -244,11 +244,11 @@ def without_turn(rig: StageRig, pose_joints=POSE_JOINTS) -> list[str]:
             if bad.any():
                 code = rig.time_codes[bad.argmax()]
                 # If a prim above has no rotation either, joints lack theirs because of it.
-                placed = rig.source.placement
+                placed = rig.joints.placement
                 whose = (
                     placed.whose(_turnless, code)
                     if _turnless(placed.at(code))
-                    else f"joint '{rig.source.names[joint]}'"
+                    else f"joint '{rig.joints.names[joint]}'"
                 )
                 found.append(f"{rig.path}: {whose} {fact} at time code {code:g}; {remedy}")
     return found
@@ -272,7 +272,7 @@ def partial_body(rig: StageRig, left: Sequence[str]) -> list[str]:
 
 def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
     """The note on a range of time codes that the animation mostly does not cover, so that the character stands still."""
-    samples = rig.source.keys.every
+    samples = rig.joints.keys.every
     if len(samples) < 2:
         return []
     within = min(samples[-1], last) - max(samples[0], first)
@@ -287,7 +287,7 @@ def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
 
 def _moves_on(rig: StageRig, first: float, last: float) -> bool:
     """Whether what places a character moves before its first key or after its last one: a spline may loop."""
-    keys, placed = rig.source.keys.every, rig.source.placement
+    keys, placed = rig.joints.keys.every, rig.joints.placement
     codes = [code for code in np.linspace(first, last, 9) if not keys[0] <= code <= keys[-1]]
     ends = np.clip(codes, keys[0], keys[-1])
     return not all(np.allclose(placed.at(code), placed.at(end)) for code, end in zip(codes, ends))

@@ -28,7 +28,7 @@ def other_hair(rigs: Sequence[StageRig]) -> list[str]:
     """A line for each prim of NURBS or Hermite curves that looks like hair: on a skin, or several curves near a head."""
     if not rigs:
         return []
-    others = _others(rigs[0].source.prim.GetStage())
+    others = _others(rigs[0].joints.prim.GetStage())
     return [_left_out(prim) for prim in others[:MOST] if _looks_like_hair(prim, rigs)]
 
 

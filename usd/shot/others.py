@@ -59,7 +59,7 @@ class Others:
             for rig in self._named:
                 ends = rig.time_codes[[0, -1]]
                 upper = [rig.character.humanoid[name] for name in UPPER if name in rig.character.humanoid]
-                places = [each.posed(ends)[:, :, :3, 3] for each in (rig.source, source)]
+                places = [each.posed(ends)[:, :, :3, 3] for each in (rig.joints, source)]
                 apart = np.abs(places[0][:, upper, None] - places[1][:, None]).max(axis=(0, 3))
                 if apart.min(initial=np.inf) * rig.border.metres_per_unit < SAME:
                     return True

@@ -38,7 +38,7 @@ def strays(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
     """The note on hair without a binding whose own transform nearly keeps to the carrying joint, but moves relative to it, as on a
     jaw that another skeleton moves.
     """
-    if not placement.samples or not rig.source.animated:
+    if not placement.samples or not rig.joints.animated:
         return []
     times, core = placement.samples[:: max(1, len(placement.samples) // SOME_TIMES)], rig.border.to_core
     middle = some_ends(prim).mean(axis=0)
@@ -46,10 +46,10 @@ def strays(prim: Usd.Prim, rig: StageRig, placement: Placement) -> list[str]:
     far = strayed(path, np.stack([rig.carrying_at(time) for time in times]))
     if not STRAYS < far < np.inf:
         return []
-    with_all = strayed(path, np.stack([core @ rig.source.placement.at(time) for time in times]))
+    with_all = strayed(path, np.stack([core @ rig.joints.placement.at(time) for time in times]))
     if CLEARLY * far >= with_all:
         return []
-    joint = leaf(rig.source.names[rig.character.carrying_joint])
+    joint = leaf(rig.joints.names[rig.character.carrying_joint])
     return [
         f"{prim.GetPath()}: its own transform moves it by up to {1e3 * far:.0f} mm relative to joint '{joint}' of {rig.path}, which "
         "carries it; a bake does not follow that: bind it to the joint that it should follow"

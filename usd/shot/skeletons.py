@@ -57,11 +57,11 @@ def read_each_rig(
 
 def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
     """The joint that carries the groom of most points, and how that is known; None if nothing says so."""
-    curves = find_curves(rig.source.prim.GetStage())
+    curves = find_curves(rig.joints.prim.GetStage())
     empty = without_points(curves)
     for prim in sorted((p for p in curves if p not in empty), key=lambda prim: -len(rest_points(prim))):
         told = recorded_joint(prim)
-        if told in rig.source.names:
+        if told in rig.joints.names:
             return told, f"told by the bake of {prim.GetPath()}"
         try:
             found = bound_joint(prim, rig, Placement(prim), seated)

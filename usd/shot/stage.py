@@ -223,7 +223,7 @@ def check_frames_named(subject, frames, first: float, last: float, rigs) -> None
     """Refuse to let a wind blow on rigs without an animation in frames that nothing names: neither `frames` nor a range from the first
     time code to the last.
     """
-    if frames is None and first == last and not any(rig.source.animated for rig in rigs):
+    if frames is None and first == last and not any(rig.joints.animated for rig in rigs):
         raise NeuralocksError(
             f"{subject}: has neither an animation nor a range of frames; name those in which the wind blows with "
             "--frames FIRST:LAST"
@@ -258,10 +258,10 @@ def _grooms(search: HairSearch, curves: list[Usd.Prim], notes: list[str]) -> lis
 
 def _moving(grooms: list[StageGroom], notes: list[str]) -> list[StageGroom]:
     """The grooms whose skeleton is animated, with a note on the others; all if none is."""
-    moving = [item for item in grooms if item.attachment.rig.source.animated]
+    moving = [item for item in grooms if item.attachment.rig.joints.animated]
     if not moving:
         return grooms
-    still = [item for item in grooms if not item.attachment.rig.source.animated]
+    still = [item for item in grooms if not item.attachment.rig.joints.animated]
     notes += [stands_still(item.path, item.attachment.rig) for item in still]
     return moving
 
@@ -293,5 +293,5 @@ def _rigs(stage, border, skeleton, head, path, *, joints, **options) -> tuple[li
 
 
 def _check_animated(rigs: list[StageRig]) -> None:
-    if not any(rig.source.animated for rig in rigs):
+    if not any(rig.joints.animated for rig in rigs):
         raise NeuralocksError(not_animated(rigs[0]))

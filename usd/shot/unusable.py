@@ -76,7 +76,7 @@ def lies_on(
     if not unusable:
         return None
     carriers, border = [found.rig] if found else rigs, rigs[0].border
-    known = max(kinship(prim, rig.source.prim) for rig in carriers)
+    known = max(kinship(prim, rig.joints.prim) for rig in carriers)
     unusable = sorted(unusable, key=lambda each: -kinship(prim, each.prim))
     if not placement.usable:  # a scale of zero that hides a character, say, hides its hair, too
         return next((each for each in unusable if kinship(prim, each.prim) > known), None)

@@ -51,7 +51,7 @@ def ways(
     still += [rig.to_bind @ np.linalg.inv(rig.bind_shown) @ groom, rig.to_bind @ groom]
     if placement.brought is not None:  # another file's groom knows nothing of where the character's file puts it
         still.append(rig.border.to_core @ groom)
-    if not rig.source.animated:
+    if not rig.joints.animated:
         return still if likely else []
     if when is not None:  # it is seen where it is then
         return (_posed(rig, placement, when) or still) if likely else still
@@ -79,14 +79,14 @@ def rest_way(rig: StageRig, placement: Placement, when: float | None, drifts: tu
     """The way (4, 4) of hair that stands still and was made on a head in the rest pose, in which USD shows a character without its
     animation; None of hair that moves.
     """
-    if rig.source.animated and (when is not None or (drifts or drifts_of(rig, placement))[0] > STEADY):
+    if rig.joints.animated and (when is not None or (drifts or drifts_of(rig, placement))[0] > STEADY):
         return None
     return np.linalg.inv(rig.carrying_at_rest) @ rig.border.to_core @ placement.reference
 
 
 def beginnings(rig: StageRig) -> list[float]:
     """Time codes at which the motion begins, and the shot begins, if that is after a run-up."""
-    (first, last), stage = rig.time_codes[[0, -1]].tolist(), rig.source.prim.GetStage()
+    (first, last), stage = rig.time_codes[[0, -1]].tolist(), rig.joints.prim.GetStage()
     start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else first
     return [first, start] if first < start <= last else [first]
 
@@ -103,10 +103,10 @@ def drifts_of(rig: StageRig, placement: Placement) -> tuple[float, float]:
     """How much a prim moves relative to a skeleton, and to its head; (0, 0) if either stands still, infinity for the head if the
     skeleton's place moves the prim.
     """
-    if not placement.samples or not rig.source.animated:
+    if not placement.samples or not rig.joints.animated:
         return 0.0, 0.0
     about = ABOUT / rig.border.metres_per_unit
-    with_skeleton = _drift(placement, rig.source.placement.at, about)
+    with_skeleton = _drift(placement, rig.joints.placement.at, about)
     if with_skeleton <= STEADY:
         return with_skeleton, np.inf
     return with_skeleton, _drift(

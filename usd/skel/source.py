@@ -97,7 +97,7 @@ def read_rig(
     clip = replace(clip, cuts=known)
     return StageRig(
         path=source.path,
-        source=source,
+        joints=source,
         border=border,
         meshes=meshes,
         to_bind=to_bind,

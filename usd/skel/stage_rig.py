@@ -32,7 +32,7 @@ class StageRig:
 
     Attributes:
         path: the Skeleton prim.
-        source: the skeleton as authored.
+        joints: the skeleton as authored.
         border: the stage's units.
         meshes: what it skins.
         to_bind: authored bind space to bind world [m], (4, 4).
@@ -46,7 +46,7 @@ class StageRig:
     """
 
     path: str
-    source: JointSource = field(repr=False)
+    joints: JointSource = field(repr=False)
     border: Border
     meshes: list[StageMesh] = field(repr=False)
     to_bind: np.ndarray = field(repr=False)
@@ -80,21 +80,21 @@ class StageRig:
     @cached_property
     def bind_shown(self) -> np.ndarray:
         """See `bind_world.bind_shown`."""
-        return bind_shown(self.source)
+        return bind_shown(self.joints)
 
     def joints_at(self, time_code: float) -> np.ndarray:
         """World joint transforms (J, 4, 4) [m] as a renderer sees them at a time code."""
-        return self.border.to_core @ self.source.posed([time_code])[0] @ self._trim
+        return self.border.to_core @ self.joints.posed([time_code])[0] @ self._trim
 
     @property
     def _joints_at_rest(self) -> np.ndarray:
-        return self.border.to_core @ self.source.at_rest @ self._trim
+        return self.border.to_core @ self.joints.at_rest @ self._trim
 
     def shape_at(self, time_code: float) -> np.ndarray:
         """Blend shape weights (B,) as a renderer sees them at a time code: between samples of the clip, the way from one to the next
         may lead past an inbetween, or step.
         """
-        return all_shares(self.source.shape(list(self.knots), [time_code]), self.knots)[0]
+        return all_shares(self.joints.shape(list(self.knots), [time_code]), self.knots)[0]
 
     def authored_turns(self, joints: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Turns (..., N, 4) wxyz of joints (N,) in the bind axes that the file gives them, from those in the core's: a turn about
@@ -120,7 +120,7 @@ class StageRig:
             return [f"{self.path}: has no animation, whose length a loop would have; gusts do not repeat"]
         if turn.max() > LOOP_GAP:
             # Joints below a joint turn with it, up to rounding: the first of them is the cause.
-            name = self.source.names[int(np.flatnonzero(turn > turn.max() - 0.1)[0])]
+            name = self.joints.names[int(np.flatnonzero(turn > turn.max() - 0.1)[0])]
             notes.append(
                 f"{self.path}: joint '{name}' is turned by {turn.max():.0f} degrees between time codes {start:g} and {end:g}; "
                 "a loop must end with the pose that it begins with"
@@ -186,7 +186,7 @@ class StageRig:
     @cached_property
     def _repeated(self) -> slice:
         """Samples of the clip that are in a loop."""
-        body, same = self.source.keys.body or self.time_codes, SAME * self.border.frame
+        body, same = self.joints.keys.body or self.time_codes, SAME * self.border.frame
         # Of what is keyed together, the clip has the latest.
         return slice(*np.searchsorted(self.time_codes, [body[0] - same, body[-1] + same], side="right"))
 
@@ -219,11 +219,11 @@ class StageRig:
     @cached_property
     def motion_sketch(self) -> str:
         """The `motion_sketch` of its skeleton."""
-        return motion_sketch(self.source, self.border.rate)
+        return motion_sketch(self.joints, self.border.rate)
 
     @cached_property
     def _trim(self) -> np.ndarray:
-        return joint_trim(self.source, self.to_bind)
+        return joint_trim(self.joints, self.to_bind)
 
 
 def joint_trim(source: JointSource, to_bind: np.ndarray) -> np.ndarray:

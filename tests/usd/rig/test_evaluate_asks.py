@@ -36,7 +36,7 @@ def test_of_what_only_a_parent_moves_hair_is_carried_rigidly(tmp_path, last):
         turn.Set(10.0 * code, code)
     stage.SetEndTimeCode(last)
     stage.GetRootLayer().Save()
-    assert read_rigged_hair(shot).source.source.animation is None
+    assert read_rigged_hair(shot).stage_rig.joints.animation is None
     card = evaluate_rig(shot, progress=lambda *words: said.append(words)).measures
     assert card["frames"] == last and card["swing_mm"] == pytest.approx(0, abs=1e-6)
     assert said == [(done + 1, last, "posing the hair") for done in range(last)]

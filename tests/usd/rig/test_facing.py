@@ -63,7 +63,7 @@ def _askew(names, binds):
 )
 def test_a_bind_pose_that_faces_otherwise_is_told(rebound, change, words):
     shot = rebound(change)
-    for notes in (rigged_notes(read_rigged_hair(shot).source), inspect(shot)["spoils"]):
+    for notes in (rigged_notes(read_rigged_hair(shot).stage_rig), inspect(shot)["spoils"]):
         assert sum(bool(re.search(words or "faces", note)) for note in notes) == (words is not None), notes
 
 
@@ -75,5 +75,5 @@ def test_a_trained_model_knows_which_way_its_rig_faces(rebound, tmp_path, monkey
     monkeypatch.setattr("neuralocks_core.training.rig.static.train_static", lambda *_, **__: model_for(hair))
     train_rig(shot, tmp_path / "m.neuralocks", dynamic=False, tell=told.extend)
     kept = RigModel.load(tmp_path / "m.neuralocks").training["facing"]
-    assert kept == pytest.approx(hair.source.character.facing_angle, abs=1e-3) and abs(kept) > 2
+    assert kept == pytest.approx(hair.stage_rig.character.facing_angle, abs=1e-3) and abs(kept) > 2
     assert any("off the stage's nearest axis" in note for note in told)

@@ -53,7 +53,7 @@ def test_hair_is_trained_and_measured_with_the_leaders_body(tmp_path, skeleton):
     modular = _modular(tmp_path / "modular.usda")
     one, other = (read_rigged_hair(path, skeleton=skeleton) for path in (tmp_path / "whole.usda", modular))
     bodies = [hair.rig.character.body for hair in (one, other)]
-    joints = one.source.clip.joints[7] @ one.rig.character.inverse_bind
+    joints = one.stage_rig.clip.joints[7] @ one.rig.character.inverse_bind
     np.testing.assert_allclose(*(body.posed(joints)[body.triangles] for body in bodies), atol=1e-6)
     assert all(trimesh.Trimesh(body.points, body.triangles).is_watertight for body in bodies)
     cards = [evaluate_rig(path, skeleton=skeleton).measures for path in (tmp_path / "whole.usda", modular)]

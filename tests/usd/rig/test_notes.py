@@ -67,7 +67,7 @@ def test_rotations_that_stretch_are_told(edited):
         for code in rotations.GetTimeSamples():
             rotations.Set(Vt.QuatfArray([q * 1.5 for q in rotations.Get(code)]), code)
 
-    notes = rigged_notes(read_rigged_hair(edited(change)).source)
+    notes = rigged_notes(read_rigged_hair(edited(change)).stage_rig)
     assert sum("joint 'hips' at time code 1 is not of unit length" in note for note in notes) == 1
 
 
@@ -88,7 +88,7 @@ def test_a_neck_without_its_name_can_be_named(edited, tmp_path):
 
     shot = edited(change)
     hair = read_rigged_hair(shot)
-    assert any("no joint found for neck" in note for note in rigged_notes(hair.source))
+    assert any("no joint found for neck" in note for note in rigged_notes(hair.stage_rig))
     model = model_for(hair)
     named = bake_rig(shot, tmp_path / "named.usda", model, joints={"neck": "b02"})
     assert not any("no joint found for neck" in note for note in named.notes)
@@ -129,7 +129,7 @@ def test_what_is_wrong_with_a_rig_is_told_by_its_own_commands(tmp_path):
     shot = small_shot(tmp_path / "shot.usda", scale=100.0)
     told = inspect(shot)["spoils"]
     assert not any("shoulder" in note for note in told)
-    assert set(rigged_notes(read_rigged_hair(shot).source)) <= set(told)
+    assert set(rigged_notes(read_rigged_hair(shot).stage_rig)) <= set(told)
 
 
 def test_features_that_do_not_fit_are_refused(tmp_path):
@@ -138,7 +138,7 @@ def test_features_that_do_not_fit_are_refused(tmp_path):
     with pytest.raises(NeuralocksError, match="reads 15 numbers"):
         model.evaluate(np.zeros((2, 3, 15)))
     assert np.isfinite(model.evaluate(np.full(15, 1e300))).all()
-    sampler = RigSampler(model.spec, hair.source.character, hair.source.clip)
+    sampler = RigSampler(model.spec, hair.stage_rig.character, hair.stage_rig.clip)
     for times, fact in (([0.0, np.nan], "hold NaN"), ([[0.5, 1.0]], r"are of shape \(1, 2\)")):
         with pytest.raises(NeuralocksError, match=f"times: {fact}"):
             sampler.features(times)

@@ -56,7 +56,7 @@ def test_a_skeleton_without_an_animation_is_told_to_have_none(tmp_path, bound):
     shot = small_shot(tmp_path / "shot.usda")
     hair = read_rigged_hair(shot)
     model, stage = model_for(hair), Usd.Stage.Open(str(shot))
-    animation = hair.source.source.animation.GetPath()
+    animation = hair.stage_rig.joints.animation.GetPath()
     if bound:
         stage.RemovePrim(animation)
     else:
@@ -76,7 +76,7 @@ def test_a_range_that_cannot_be_meant_gives_way_to_the_animations(tmp_path, firs
     stage.SetEndTimeCode(24)
     stage.GetRootLayer().Save()
     out = bake_rig(shot=shot, out=tmp_path / "out.usda", model=model)
-    assert out.rigs[0].samples == len(read_rigged_hair(shot).source.time_codes)
+    assert out.rigs[0].samples == len(read_rigged_hair(shot).stage_rig.time_codes)
 
 
 def test_a_held_head_is_that_of_a_held_pose(tmp_path):
@@ -181,13 +181,13 @@ def test_an_animation_that_is_switched_off_is_not_played(tmp_path):
 def test_weights_that_do_not_sum_to_one_are_noted(tmp_path):
     """They are read as if they summed to one."""
     hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.5))
-    assert "do not sum to one" in weight_notes(hair.source)[0]
+    assert "do not sum to one" in weight_notes(hair.stage_rig)[0]
     assert hair.rig.weights.sum(axis=1) == pytest.approx(1)
 
 
 def test_vertices_without_weights_are_told_as_such(tmp_path):
     hair = read_rigged_hair(small_shot(tmp_path / "shot.usda", weights=0.0))
-    (note,) = weight_notes(hair.source)
+    (note,) = weight_notes(hair.stage_rig)
     assert "have no weights and are read as bound to the first joint" in note
 
 

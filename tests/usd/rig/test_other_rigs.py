@@ -143,7 +143,7 @@ def test_joint_orients_cancel(tmp_path):
     since = []
     for shot in (plain, other):
         bake_rig(shot, tmp_path / f"out_{shot.name}", model)
-        source = read_rigged_hair(tmp_path / f"out_{shot.name}").source.source
+        source = read_rigged_hair(tmp_path / f"out_{shot.name}").stage_rig.joints
         posed = source.posed([1, 7, 13, 20])[:, 2:5, :3, :3]
         since.append(posed @ np.swapaxes(source.bind[2:5, :3, :3], -1, -2))
     assert np.abs(since[0] - since[1]).max() < 1e-5 and np.abs(since[0] - np.eye(3)).max() > 0.1
@@ -157,7 +157,7 @@ def test_mirrored_joints_move_alike(tmp_path, first):
     model, places = model_for(read_rigged_hair(plain)), []
     for shot in (plain, small_shot(tmp_path / "mirrored.usda", orient=orient, mirrored=first)):
         bake_rig(shot, tmp_path / f"out_{shot.name}", model)
-        both = (read_rigged_hair(path).source.source for path in (shot, tmp_path / f"out_{shot.name}"))
+        both = (read_rigged_hair(path).stage_rig.joints for path in (shot, tmp_path / f"out_{shot.name}"))
         places.append([source.posed([1, 7, 13, 20])[:, :, :3, 3] for source in both])
     (still, moved), (mirrored_still, mirrored_moved) = places
     assert np.abs(moved - mirrored_moved).max() < 1e-6 and np.abs(moved - still).max() > 0.01

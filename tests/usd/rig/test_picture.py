@@ -32,7 +32,7 @@ def test_a_picture_of_mesh_hair(tmp_path):
     cable.CreateCurveVertexCountsAttr([2])
     stage.GetRootLayer().Save()
     rigged = read_rigged_hair(baked)
-    scene, meshes = rigged_scene(rigged), rigged.source.meshes
+    scene, meshes = rigged_scene(rigged), rigged.stage_rig.meshes
     begin = 0
     for mesh in meshes:
         end = begin + len(mesh.points)
@@ -77,16 +77,16 @@ def test_of_several_characters_one_that_is_baked_is_drawn(tmp_path):
     stage.Save()
     model = model_for(read_rigged_hair(shot))
     baked = bake_rig(tmp_path / "two.usda", tmp_path / "out.usda", model, skeleton="/B/Rig").path
-    assert read_rigged_hair(baked, baked_first=True).source.path == "/B/Rig"
-    assert read_rigged_hair(tmp_path / "two.usda", baked_first=True).source.path == "/A/Rig"
+    assert read_rigged_hair(baked, baked_first=True).stage_rig.path == "/B/Rig"
+    assert read_rigged_hair(tmp_path / "two.usda", baked_first=True).stage_rig.path == "/A/Rig"
     with pytest.raises(NeuralocksError, match="2 skeletons have hair chains"):
         read_rigged_hair(baked)
     both = bake_rig(tmp_path / "two.usda", tmp_path / "both.usda", model).path
-    assert read_rigged_hair(both, baked_first=True).source.path == "/A/Rig"
+    assert read_rigged_hair(both, baked_first=True).stage_rig.path == "/A/Rig"
     UsdGeom.Imageable(stage.GetPrimAtPath("/A")).MakeInvisible()  # its message was that no mesh is skinned
     stage.Save()
     drawn = read_rigged_hair(both, baked_first=True)
-    assert drawn.source.path == "/B/Rig" and drawn.others == ("/A/Rig",)
+    assert drawn.stage_rig.path == "/B/Rig" and drawn.others == ("/A/Rig",)
 
 
 def test_joints_without_a_mesh_have_no_picture(tmp_path):
@@ -116,15 +116,15 @@ def test_a_character_without_hair_is_no_bake(tmp_path):
 def test_each_picture_shows_the_pose_of_its_sample(tmp_path):
     """Vertices follow the joint that drives them; a film begins anew where the shot is cut, but for a loop, which has no cuts."""
     rigged = read_rigged_hair(small_shot(tmp_path / "shot.usda"))
-    source, body = rigged.source, rigged.source.character.body
-    clip = source.clip
-    scene = rigged_scene(replace(rigged, source=replace(source, clip=replace(clip, cuts=clip.times[2:3]))))
+    stage_rig, body = rigged.stage_rig, rigged.stage_rig.character.body
+    clip = stage_rig.clip
+    scene = rigged_scene(replace(rigged, stage_rig=replace(stage_rig, clip=replace(clip, cuts=clip.times[2:3]))))
     assert np.array_equal(scene.times, clip.times) and np.array_equal(scene.cuts, clip.times[2:3])
-    assert len(rigged_scene(replace(rigged, source=replace(source, clip=replace(clip, loop=True)))).cuts) == 0
+    assert len(rigged_scene(replace(rigged, stage_rig=replace(stage_rig, clip=replace(clip, loop=True)))).cuts) == 0
     joint, rest = body.joint_indices[:, 0], np.append(body.points, np.ones((len(body.points), 1)), axis=1)
     assert (body.joint_weights[:, 0] == 1).all()
     for frame in (0, 3, len(clip.times) - 1):
-        moved = clip.joints[frame] @ np.linalg.inv(source.character.skeleton.bind)
+        moved = clip.joints[frame] @ np.linalg.inv(stage_rig.character.skeleton.bind)
         np.testing.assert_allclose(scene.body(frame), np.einsum("vij,vj->vi", moved[joint], rest)[:, :3], atol=1e-5)
-        np.testing.assert_allclose(scene.head[frame], moved[source.character.head], atol=1e-5)
+        np.testing.assert_allclose(scene.head[frame], moved[stage_rig.character.head], atol=1e-5)
     assert np.abs(scene.body(3) - scene.body(0)).max() > 1e-3

@@ -42,13 +42,13 @@ def test_hair_that_hangs_beside_the_head_is_told(edited, tmp_path, above, lock, 
     shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{above}/{lock}", f"{head}/hair_0/end"))
     hair = read_rigged_hair(shot)
     baked = bake_rig(shot, tmp_path / "out.usda", model_for(hair)).notes
-    for notes in (baked, rigged_notes(hair.source), inspect(shot)["spoils"]):
+    for notes in (baked, rigged_notes(hair.stage_rig), inspect(shot)["spoils"]):
         assert [note for note in notes if " not moved; " in note] == ([f"/Who/Rig: {told}"] if told else [])
 
 
 def test_of_several_joints_beside_the_head_one_is_named(edited):
     shot = edited(_named("hips", "hips/head", "hips/pony", "hips/pony_2", "hips/head/hair_0", "hips/head/hair_0/end"))
-    (note,) = [note for note in rigged_notes(read_rigged_hair(shot).source) if "not moved" in note]
+    (note,) = [note for note in rigged_notes(read_rigged_hair(shot).stage_rig) if "not moved" in note]
     assert note == "/Who/Rig: 'pony' and 1 more hang from 'hips' and are not moved; parent them to the head in the rig"
 
 
@@ -64,9 +64,9 @@ def test_hair_below_a_copy_of_the_head_is_moved(edited):
         UsdSkel.BindingAPI(stage.GetPrimAtPath("/Who/Hair")).GetJointIndicesPrimvar().Set([1] * 3 + [3] * 3 + [4] * 3)
 
     hair = read_rigged_hair(edited(change))
-    assert hair.source.character.skeleton.names[hair.source.character.head] == "hips/head"
+    assert hair.stage_rig.character.skeleton.names[hair.stage_rig.character.head] == "hips/head"
     assert hair.rig.chains.names == ("hair_0", "hair_1")
-    assert not [note for note in rigged_notes(hair.source) if "not moved" in note]
+    assert not [note for note in rigged_notes(hair.stage_rig) if "not moved" in note]
 
 
 def test_no_joint_is_told_because_of_the_rigs_name(edited):
@@ -82,13 +82,13 @@ def test_no_joint_is_told_because_of_the_rigs_name(edited):
     shot = edited(_named(*("/".join(f"Pony_{part}" for part in joint.split("/")) for joint in joints)))
     hair = read_rigged_hair(shot)
     assert hair.rig.chains.names == ("Pony_hair_0",)
-    assert not any(" not moved; " in note for note in rigged_notes(hair.source))
+    assert not any(" not moved; " in note for note in rigged_notes(hair.stage_rig))
 
 
 def test_a_joint_beside_the_head_that_moves_nothing_is_not_told(edited):
     head = "hips/neck/head"
     shot = edited(_named("hips", "hips/neck", head, f"{head}/hair_0", f"{head}/hair_0/end", "hips/neck/pony"))
-    assert not any(" not moved; " in note for note in rigged_notes(read_rigged_hair(shot).source))
+    assert not any(" not moved; " in note for note in rigged_notes(read_rigged_hair(shot).stage_rig))
 
 
 @pytest.mark.parametrize(
@@ -246,5 +246,5 @@ def test_hair_that_an_earlier_bake_moves_is_not_called_unmoved(edited, tmp_path,
     assert len(unmoved) == 1 and told in unmoved[0]
     bake_rig(shot, one, model_for(read_rigged_hair(shot, **first)), head=first["head"])
     baked = bake_rig(one, two, model, head=head).notes
-    for notes in (baked, rigged_notes(read_rigged_hair(two, head=head, chains=["hair_0"]).source)):
+    for notes in (baked, rigged_notes(read_rigged_hair(two, head=head, chains=["hair_0"]).stage_rig)):
         assert not any("not moved" in note for note in notes)

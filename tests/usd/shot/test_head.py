@@ -76,7 +76,7 @@ def test_the_roots_of_strands_from_tip_to_root_tell_the_head(tmp_path, bound):
     shot = read_shot(path)
     (item,) = shot.grooms
     assert sum("from tip to root" in note for note in shot.notes) == 1
-    head = item.attachment.rig.source.names[item.attachment.character.head]
+    head = item.attachment.rig.joints.names[item.attachment.character.head]
     assert (item.joint, head) == ("hips/spine/Hals/Kopf",) * 2
     assert not any("is not used" in note for note in shot.notes)
 

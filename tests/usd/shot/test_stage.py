@@ -31,7 +31,7 @@ def test_poses_are_those_of_usd_skel(tmp_path, recipe):
     query = cache.GetSkelQuery(UsdSkel.Skeleton(shot.stage.GetPrimAtPath("/Hero/Rig")))
     for code in (1.0, 3.5, 9.0, 20.0):
         theirs = np.array(query.ComputeJointSkelTransforms(code)).swapaxes(-1, -2)
-        assert np.abs(rig.source.posed([code])[0] - theirs).max() < 1e-5
+        assert np.abs(rig.joints.posed([code])[0] - theirs).max() < 1e-5
     at_frame = rig.clip.at([shot.border.seconds(4.0)])[0]
     assert np.abs(rig.joints_at(4.0) - at_frame).max() < 1e-9
 

@@ -47,8 +47,8 @@ def test_a_pose_that_is_held_for_long_is_computed_once(tmp_path, monkeypatch):
     for row, code in enumerate(rig.time_codes):
         if code in (-300, 0, 1, 4, 9, 10, 12, 15, 20, 21, 400):
             np.testing.assert_array_equal(rig.clip.joints[row], rig.joints_at(code))
-            one = rig.source.placement.at(code) @ local(rig.source, [code])[0, 0]
-            np.testing.assert_array_equal(rig.source.posed([code])[0, 0], one)
+            one = rig.joints.placement.at(code) @ local(rig.joints, [code])[0, 0]
+            np.testing.assert_array_equal(rig.joints.posed([code])[0, 0], one)
 
 
 @pytest.mark.parametrize("rate", [24.0, 60.0, 1000.0])
@@ -255,7 +255,7 @@ def test_more_samples_than_can_be_held_are_read_once_a_frame(tmp_path, monkeypat
         turns.Set(turns.Get(float(code)), float(code))
     stage.Save()
     every = read_shot(path).rigs[0]
-    joints = len(every.source.names)
+    joints = len(every.joints.names)
     monkeypatch.setattr("usd.skel.clip_codes.LARGEST_CLIP", 12 * joints)
     rig = read_shot(path).rigs[0]
     np.testing.assert_array_equal(rig.time_codes, np.arange(1, 10))

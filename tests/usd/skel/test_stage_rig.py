@@ -78,11 +78,11 @@ def test_a_loop_that_does_not_close_is_said(tmp_path):
     turned[1] = np.block([[from_vector(np.array([0, 1.0, 0])), np.zeros((3, 1))], [np.zeros(3), 1]]) @ turned[0]
     turned[1, -1, :3, :3] = from_vector(np.array([0, 1e-4, 0])) @ turned[1, -1, :3, :3]
     (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
-    assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note  # all joints are, with it
+    assert f"joint '{rig.joints.names[0]}' is turned by 57 degrees" in note  # all joints are, with it
     assert not replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes(replaced=[0])  # which carries all others
     turned[:, -1, :3, :3] = 0  # a joint that hides its children
     (note,) = replace(rig, clip=Clip(rig.clip.times[:2], turned)).loop_notes()
-    assert f"joint '{rig.source.names[0]}' is turned by 57 degrees" in note
+    assert f"joint '{rig.joints.names[0]}' is turned by 57 degrees" in note
 
 
 def test_a_loop_ends_with_its_last_sample_whatever_rounded_the_range_of_its_shot(tmp_path):
@@ -123,7 +123,7 @@ def test_a_root_on_animation_curves_moves_as_one_with_samples(tmp_path):
             turn.SetSpline(_spline(ts))
         stage.GetRootLayer().Save()
         rigs.append(read_rigs(path)[0])
-    assert rigs[1].source.animated
+    assert rigs[1].joints.animated
     np.testing.assert_allclose(rigs[1].clip.joints, rigs[0].clip.joints, atol=1e-6)
     assert len(rigs[1].time_codes) == 9
 
