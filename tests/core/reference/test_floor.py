@@ -45,7 +45,11 @@ def test_wind_blows_in_restarts_as_it_does_in_the_clip():
 def test_frames_ahead_shape_the_motion_before_in_restarts_too():
     """They were compared themselves, or the restarts ended so many frames early."""
     rest, head = groom(2, curl=0), shaken(34)
-    floor = stateless_floor(rest, head, history=25, every=5, ahead=3, substeps=2)
+    told = []
+    floor = stateless_floor(
+        rest, head, history=25, every=5, ahead=3, substeps=2, progress=lambda *done: told.append(done)
+    )
+    assert told == [(1, 2, "restarting"), (2, 2, "restarting")]
     assert floor.frames.tolist() == [25, 30] and floor.rms < 0.2
 
 
@@ -56,6 +60,9 @@ def test_frames_ahead_shape_the_motion_before_in_restarts_too():
         ({"truth": "all"}, "truth: is not an array of numbers"),
         ({"history": 10.0}, "history 10.0, every 10: give whole numbers"),
         ({"every": True}, "every True: give whole numbers"),
+        ({"history": 0}, "a history of 0 looked at every 10"),
+        ({"every": 0}, "a history of 20 looked at every 0"),
+        ({"history": 30}, "40 frames for a history of 30 looked at every 10; give a longer clip"),
     ],
 )
 def test_what_does_not_fit_is_named(changed, fact):
