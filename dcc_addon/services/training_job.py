@@ -125,7 +125,7 @@ class TrainingJob:
             ) from None
         with suppress(OSError), self._process.stdin as heard:  # a process that has ended already says why
             heard.write(json.dumps(settings))
-        self._tail: list[str] = []
+        self._last = ""
         self._threads = [threading.Thread(target=f, daemon=True) for f in (self._listen, self._drain)]
         for thread in self._threads:
             thread.start()
@@ -174,7 +174,7 @@ class TrainingJob:
             return f"it ended without {self.out}; try again"
         if self._process.returncode == -_KILLED:  # nothing that it said before tells why
             return "its process was killed; free some memory, and try again"
-        return self._tail[-1] if self._tail else f"training ended with status {self._process.returncode}"
+        return self._last or f"training ended with status {self._process.returncode}"
 
     def _listen(self) -> None:
         with self._process.stdout as lines:
@@ -199,8 +199,7 @@ class TrainingJob:
     def _drain(self) -> None:
         with self._process.stderr as lines:
             for line in lines:
-                if line.strip():
-                    self._tail = [*self._tail[-20:], line.strip()]
+                self._last = line.strip() or self._last
 
 
 def default_python() -> str:
