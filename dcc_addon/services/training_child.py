@@ -14,34 +14,39 @@ LEARNED, AROUND = 30.0, 100.0
 def main() -> int:
     """Train strands or hair bones; exit status 1 with an `error` line for what a user can fix."""
     settings = json.load(sys.stdin)
-    say = _printer(sys.stdout)
+    say = _progress()
     from neuralocks_core.errors import NeuralocksError
     from neuralocks_core.training.work import abandon
 
     try:
         (_train_rig if settings["kind"] == "rig" else _train_strands)(settings, say)
     except NeuralocksError as error:
-        print(json.dumps({"error": str(error)}), flush=True)
+        _send(error=str(error))
         return 1
     finally:
         abandon(settings["out"])  # also if Blender is gone: its next training does not resume from there
     return 0
 
 
-def _printer(stream):
+def _send(**said) -> None:
+    """Report to Blender."""
+    print(json.dumps(said), flush=True)
+
+
+def _progress():
     parent = os.getppid()
 
     def say(done: int, total: int, message: str) -> None:
         if os.getppid() != parent:  # Blender is gone, and nobody waits for the model
             sys.exit(1)
-        print(json.dumps({"done": done / max(total, 1), "message": message}), file=stream, flush=True)
+        _send(done=done / max(total, 1), message=message)
 
     return say
 
 
 def _tell(notes) -> None:
     """Report notes on the character, or on what was learned."""
-    print(json.dumps({"notes": [str(note) for note in notes]}), flush=True)
+    _send(notes=[str(note) for note in notes])
 
 
 def _train_strands(settings: dict, say) -> None:
@@ -53,7 +58,7 @@ def _train_strands(settings: dict, say) -> None:
             say(done, total, message)
         else:  # progress of the work before the training time begins
             say(0, 1, message)
-            print(json.dumps({"before": done / max(total, 1)}), flush=True)
+            _send(before=done / max(total, 1))
 
     say(0, 1, "Reading the character")
     character, minutes = settings["character"], settings["minutes"]
