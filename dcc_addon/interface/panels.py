@@ -285,7 +285,7 @@ def findings(armature) -> tuple[list[str], str]:
         _findings.clear()
         try:
             rig = armature_reader.read(armature, chosen)
-            humanoid = rig.humanoid()
+            humanoid = rig.humanoid
             head = humanoid["head"]
             reason = humanoid.reasons["head"]
             why = "" if reason.startswith(("by name", "given")) else f" ({reason})"

@@ -68,18 +68,6 @@ class RigArrays:
             found += [path for path, bone in zip(self.paths, self.bones, strict=True) if matches(bone, word)] or [word]
         return found
 
-    def by_hand(self) -> dict[str, str]:
-        """The joint map given by the artist.
-
-        Raises:
-            NeuralocksError: the rig has no bone of the name chosen.
-        """
-        if not self.head_bone:
-            return {}
-        if self.head_bone not in self.bones:
-            raise NeuralocksError(f"{self.name}: it has no bone '{self.head_bone}'; choose the head bone again")
-        return {"head": self.paths[self.bones.index(self.head_bone)]}
-
     def named_head(self) -> int | None:
         """The bone that is named like a head, whatever the artist chose; None if there is none."""
         try:
@@ -87,19 +75,22 @@ class RigArrays:
         except NeuralocksError:
             return None
 
-    def humanoid(self) -> Humanoid:
-        """Which bone is which, found once; errors are in the words of the panel."""
-        return self._humanoid
-
     @cached_property
-    def _humanoid(self) -> Humanoid:
+    def humanoid(self) -> Humanoid:
+        """Which bone is which; errors are in the words of the panel.
+
+        Raises:
+            NeuralocksError: there are no bones, or none for the head.
+        """
         if not self.bones:
             raise NeuralocksError(f"{self.name}: the armature has no bones; choose the armature that moves the body")
+        if self.head_bone:
+            if self.head_bone not in self.bones:
+                raise NeuralocksError(f"{self.name}: it has no bone '{self.head_bone}'; choose the head bone again")
+            return self._found({"head": self.paths[self.bones.index(self.head_bone)]})
         try:
-            return self._found(self.by_hand())
+            return self._found({})
         except NeuralocksError:
-            if self.head_bone:
-                raise
             raise NeuralocksError(f"{self.name}: no bone is named like a head; choose the head bone") from None
 
     def _found(self, by_hand: dict[str, str]) -> Humanoid:
@@ -170,7 +161,7 @@ def character(
         metres: of one unit of this bind pose; see `SampledRig.bind_metres`.
     """
     core = to_core(metres)
-    humanoid = rig.humanoid()
+    humanoid = rig.humanoid
     skeleton = Skeleton(tuple(rig.paths), rig.parents, core @ bind_world(rig, place))
     labels = iter(shape_names([body for body, _ in bodies]))
     parts = [_body(body, body_place, core, rig.bones, labels) for body, body_place in bodies]
@@ -195,7 +186,7 @@ def size_shown(rig: RigArrays, place: np.ndarray, heads: np.ndarray) -> float:
     """How much larger a motion shows the head than the bind pose does, as `usd` measures it in a stage; `heads` are its world
     transforms (T, 4, 4) from channels, `place` is as for `character`.
     """
-    head = rig.humanoid()["head"]
+    head = rig.humanoid["head"]
     size = float(np.median(sizes_shown(heads, bind_world(rig, place)[head])))
     return 1.0 if abs(size - 1) < 1e-4 else size
 
@@ -204,7 +195,7 @@ def stood_up(rig: RigArrays, place: np.ndarray) -> np.ndarray:
     """Where an armature object at `place` (4, 4) stands in the bind pose: at the same place, upright."""
     similar(place, rig.name)  # for an error with the rig's name
     result = np.array(place, float)
-    result[:3, :3] = standing(result[:3, :3], rig.rest[:, :3, 3], rig.humanoid(), np.array([0.0, 0.0, 1.0]))
+    result[:3, :3] = standing(result[:3, :3], rig.rest[:, :3, 3], rig.humanoid, np.array([0.0, 0.0, 1.0]))
     return result
 
 
@@ -278,7 +269,7 @@ def groom(
 
 def advice(rig: RigArrays) -> list[str]:
     """What an artist should know about the rig, in plain words; an empty list is good news."""
-    found = rig.humanoid()
+    found = rig.humanoid
     lines = []
     unseen = {
         "neck": "the neck bend",

@@ -60,7 +60,7 @@ def test_a_rig_with_japanese_names_is_read_by_them():
     parents = np.array([-1, 0, 1, 2, 3, 4, 2, 6, 2, 8, 0])
     miku = rig.RigArrays("Miku", bones, parents, np.broadcast_to(np.eye(4), (11, 4, 4)))
     assert all(Sdf.Path.IsValidPathString(path) for path in miku.paths)
-    found = {part: bones[joint] for part, joint in miku.humanoid().items()}
+    found = {part: bones[joint] for part, joint in miku.humanoid.items()}
     wanted = {
         "head": "頭",
         "neck": "首",
@@ -126,7 +126,7 @@ def test_character_faces_forward_and_says_what_is_missing():
 def test_rig_problems_in_plain_words(bones, head, words):
     parents = np.arange(len(bones)) - 1
     with pytest.raises(NeuralocksError, match=words):
-        rig.RigArrays("Rig", bones, parents, rest()[: len(bones)], head).humanoid()
+        rig.RigArrays("Rig", bones, parents, rest()[: len(bones)], head).humanoid
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def test_errors_name_what_the_panel_has(tmp_path):
     """No option or command of a terminal, whatever the names of the chains."""
     skeleton = Skeleton(BONES, PARENTS, rest())
     arrays = rig.RigArrays("Rig", BONES, PARENTS, rest())
-    character = Character(skeleton, None, arrays.humanoid())
+    character = Character(skeleton, None, arrays.humanoid)
     for patterns in ("", "curl*", "spine", "head"):
         with pytest.raises(NeuralocksError) as error:
             bones.chains_of(arrays, character, patterns)
@@ -163,7 +163,7 @@ def test_hair_bones_have_the_names_that_blender_shows():
     places = np.tile(np.eye(4), (5, 1, 1))
     places[:, 1, 3] = [1.2, 1.6, 1.7, 1.8, 1.75]
     arrays = rig.RigArrays("Rig", names, parents, places)
-    character = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid())
+    character = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid)
     for wanted in ("hair.01", "hair.*", "hair_01", " hair.01 ,"):
         found = bones.chains_of(arrays, character, wanted)
         assert [arrays.bones[joint] for joint in found.joints] == ["hair.01"], wanted  # hair.02 is its free end
@@ -181,11 +181,11 @@ def test_a_bone_model_of_chains_of_another_length_is_refused_by_the_name_of_the_
     places = np.tile(np.eye(4), (5, 1, 1))
     places[:, 1, 3] = [1.2, 1.6, 1.7, 1.6, 1.5]
     arrays = rig.RigArrays("Rig", names, parents, places)
-    character = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid())
+    character = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid)
     model = random_rig_model(bones.chains_of(arrays, character, "hair.01"), rig_spec())
     assert bones.LiveBones.of(model, arrays, character).bones == ("hair.01", "hair.02")
     places[3, 1, 3] = 1.65
-    longer = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid())
+    longer = Character(Skeleton(arrays.paths, parents, places), None, arrays.humanoid)
     with pytest.raises(NeuralocksError, match=r"'hair\.01' lies .* train a model for this rig"):
         bones.LiveBones.of(model, arrays, longer)
 

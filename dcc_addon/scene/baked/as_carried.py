@@ -43,7 +43,7 @@ def _head(armature) -> list[float]:
     if known is None or known[0] != key:
         try:
             rig = read(armature, armature.neuralocks_character.head_bone)
-            found = rig.bones[rig.humanoid()["head"]]
+            found = rig.bones[rig.humanoid["head"]]
         except NeuralocksError:
             found = ""
         known = session.heads[armature.name_full] = key, found

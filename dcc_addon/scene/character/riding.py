@@ -57,7 +57,7 @@ def strays_told(
         places: world transforms (T, 4, 4) of the hair objects, by name, and of the armature under "".
         metres: of Blender's unit.
     """
-    joint, ways = rig.humanoid().get("hips", 0), [np.broadcast_to(np.eye(4), heads.shape), places[""], heads]
+    joint, ways = rig.humanoid.get("hips", 0), [np.broadcast_to(np.eye(4), heads.shape), places[""], heads]
     while joint >= 0:  # what carries the whole body counts like its object
         ways.append(moved(joint))
         joint = rig.parents[joint]

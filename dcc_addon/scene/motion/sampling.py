@@ -85,7 +85,7 @@ class _Recording:
     def __init__(self, context, scene, armature):
         self._context, self._scene, self.name = context, scene, armature.name_full
         self._rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
-        humanoid = self._rig.humanoid()
+        humanoid = self._rig.humanoid
         self._head, self._needed = humanoid["head"], set(humanoid.values())
         for joint in reversed(range(len(self._rig.bones))):  # parents come first
             if joint in self._needed:
