@@ -67,9 +67,9 @@ class Skeleton:
 
     def below(self, *joints: int) -> np.ndarray:
         """Which joints (J,) bool are one of these or below one."""
-        result = [False] * len(self.names)
+        result, these = [False] * len(self.names), set(joints)
         for other, parent in enumerate(self.parents.tolist()):
-            result[other] = other in joints or (parent >= 0 and result[parent])
+            result[other] = other in these or (parent >= 0 and result[parent])
         return np.array(result)
 
 

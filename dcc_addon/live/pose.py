@@ -38,8 +38,10 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
     row = sampled.motion.row(shown_frame(scene))
     if row is not None:
         same = same_pose(world, sampled.drawn[row])
-        if body:
-            same |= _hair(armature, sampled)
+        # Hair bones that are live or baked do not count as body, nor do joints below them.
+        if body and (turned := as_before(armature)):
+            hair = (joint for joint, bone in enumerate(sampled.rig.bones) if bone in turned)
+            same |= sampled.character.skeleton.below(*hair)
         if same[sampled.moving(body)].all():
             return sampled.clip.joints[row]
         if moved and graph.mode == "RENDER" and others_called():
@@ -80,12 +82,3 @@ def _tell_misrendered(name: str, fact: str) -> None:
     if name not in session.misrendered:
         session.misrendered[name] = f"{name}: {fact}"
         print(f"Neuralocks: {session.misrendered[name]}")
-
-
-def _hair(armature, sampled) -> np.ndarray:
-    """Which joints (J,) are hair bones that are live or baked, or are below such bones."""
-    turned = as_before(armature)
-    found = np.array([bone in turned for bone in sampled.rig.bones])
-    for joint, parent in enumerate(sampled.rig.parents) if turned else ():  # parents come first
-        found[joint] |= parent >= 0 and found[parent]
-    return found

@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from neuralocks_core.anatomy.hierarchy import ancestors, below
+
 from ...services import following
 from ...services import rig as rig_service
 from ..hair import curves
@@ -30,13 +32,8 @@ def carriers(
         moved: gives those of a joint, as Blender has them.
         places: those of the hair objects, by name.
     """
-    below = np.zeros(len(rig.bones), bool)
-    for joint, parent in enumerate(rig.parents):  # parents come first
-        below[joint] = parent == head or parent >= 0 and below[parent]
-    named = rig.named_head()
-    if named is not None:  # if the artist calls the neck the head, the head is not a part of it
-        below[named] = False
-    able = np.flatnonzero(below)
+    named = rig.named_head()  # if the artist calls the neck the head, the head is not a part of it
+    able = [joint for joint in below(head, rig.parents) if joint not in (head, named)]
     found = {name: following.carrier_below(place, heads, able, moved) for name, place in places.items()}
     return {name: joint for name, joint in found.items() if joint is not None}
 
@@ -57,10 +54,8 @@ def strays_told(
         places: world transforms (T, 4, 4) of the hair objects, by name, and of the armature under "".
         metres: of Blender's unit.
     """
-    joint, ways = rig.humanoid.get("hips", 0), [np.broadcast_to(np.eye(4), heads.shape), places[""], heads]
-    while joint >= 0:  # what carries the whole body counts like its object
-        ways.append(moved(joint))
-        joint = rig.parents[joint]
+    carrying = ancestors(rig.humanoid.get("hips", 0), rig.parents)  # what carries the whole body counts like its object
+    ways = [np.broadcast_to(np.eye(4), heads.shape), places[""], heads, *map(moved, carrying)]
     said = {hair.name_full: _told(hair, places[hair.name_full], ways, metres) for hair in hairs}
     return {name: text for name, text in said.items() if text}
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from neuralocks_core.anatomy.hierarchy import ancestors
 from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.motion import Clip
 
@@ -86,10 +87,8 @@ class _Recording:
         self._context, self._scene, self.name = context, scene, armature.name_full
         self._rig = armature_reader.read(armature, armature.neuralocks_character.head_bone)
         humanoid = self._rig.humanoid
-        self._head, self._needed = humanoid["head"], set(humanoid.values())
-        for joint in reversed(range(len(self._rig.bones))):  # parents come first
-            if joint in self._needed:
-                self._needed.add(self._rig.parents[joint])
+        self._head = humanoid["head"]
+        self._needed = {above for joint in humanoid.values() for above in ancestors(joint, self._rig.parents)}
         bodies = bodies_of(armature, self._scene)
         self._bodies = [body.name_full for body in bodies]
         self._rigid = [part.name_full for part in rigid_parts.find(armature, bodies, self._scene)]
