@@ -48,8 +48,10 @@ def read(mesh_object, armature) -> BodyArrays:
     points = vertices(mesh).astype(float)
     session.vertices[mesh.name_full] = number_of(mesh)
     triangles = _triangles(mesh)
-    groups = tuple(group.name for group in mesh_object.vertex_groups)
-    weights, shapes, keys = _weights(mesh, groups), {}, mesh.shape_keys
+    for _ in weighed(mesh_object):
+        pass
+    (_, groups, _), weights = session.weights[mesh.name_full]
+    shapes, keys = {}, mesh.shape_keys
     if keys and len(keys.key_blocks) > 1:
         basis = coordinates(keys.reference_key)
         points = basis
@@ -143,42 +145,26 @@ def _mirrored(body: BodyArrays, mesh_object, modifier) -> BodyArrays:
     return body
 
 
-def _weights(mesh, groups: tuple[str, ...]) -> np.ndarray:
-    """Rows (N, 3) of vertex, group, weight."""
-    for _ in _weighed(mesh, groups):
-        pass
-    return session.weights[mesh.name_full][1]
-
-
 def weighed(mesh_object) -> Iterator[None]:
-    """Read the weights of a body if they are not known, a few thousand vertices in each step: Blender gives them one by one, which
-    takes half a second for a large body.
+    """Put the weights of a body into the session, as rows (N, 3) of vertex, group, weight, unless those there are `weighed_so`; a few
+    thousand vertices in each step: Blender gives them one by one, which takes half a second for a large body. Scripts can leave
+    weights of groups that do not exist, which Blender passes over.
     """
-    return _weighed(mesh_object.data, tuple(group.name for group in mesh_object.vertex_groups))
-
-
-def _weighed(mesh, groups: tuple[str, ...]) -> Iterator[None]:
-    """Put the weights of a mesh into the session, step by step; only if some of them, or the groups, differ from those there. Scripts can
-    leave weights of groups that do not exist, which Blender passes over.
-    """
-    probe = _probe(mesh, groups)
-    name, edits, rows = mesh.name_full, session.edits, []
+    mesh, probe = mesh_object.data, weighed_so(mesh_object)
+    name, edits, groups, rows = mesh.name_full, session.edits, len(mesh_object.vertex_groups), []
     if name in session.weights and session.weights[name][0] == probe:
         return
     for first in range(0, len(mesh.vertices), WEIGHED):
         some = mesh.vertices[first : first + WEIGHED]
-        rows += [(v.index, g.group, g.weight) for v in some for g in v.groups if g.group < len(groups)]
+        rows += [(v.index, g.group, g.weight) for v in some for g in v.groups if g.group < groups]
         yield
     if edits == session.edits:  # otherwise they were edited in between and are read again
         session.weights[name] = probe, np.array(rows, float).reshape(-1, 3)
 
 
 def weighed_so(mesh_object) -> tuple:
-    """What changes when the weights of a body do, as far as some of its vertices show it."""
-    return _probe(mesh_object.data, tuple(group.name for group in mesh_object.vertex_groups))
-
-
-def _probe(mesh, groups: tuple[str, ...]) -> tuple:
+    """What changes when the weights of a body do: how many vertices it has, the names of its groups, and the weights of some vertices."""
+    mesh, groups = mesh_object.data, tuple(group.name for group in mesh_object.vertex_groups)
     some = range(0, len(mesh.vertices), max(1, len(mesh.vertices) // PROBES))
     return len(mesh.vertices), groups, tuple((g.group, g.weight) for v in some for g in mesh.vertices[v].groups)
 
