@@ -54,14 +54,14 @@ def read(mesh_object, armature) -> BodyArrays:
     shapes, keys = {}, mesh.shape_keys
     if keys and len(keys.key_blocks) > 1:
         basis = coordinates(keys.reference_key)
-        points = basis
+        points = basis.astype(float)
         for block in keys.key_blocks:
             if block != keys.reference_key:
                 if keys.use_relative:
-                    offsets = coordinates(block) - coordinates(block.relative_key or block)
+                    offsets = np.subtract(coordinates(block), coordinates(block.relative_key or block), dtype=float)
                     shapes[block.name] = offsets * _mask(block, groups, weights, len(points))
                 else:  # Blender blends the keys as they are, without their groups
-                    shapes[block.name] = coordinates(block) - basis
+                    shapes[block.name] = np.subtract(coordinates(block), basis, dtype=float)
     body = BodyArrays(mesh_object.name_full, points, triangles, groups, weights, shapes)
     for modifier in up_to_armature(mesh_object):
         if modifier.type == "MIRROR" and modifier.show_render:
@@ -216,15 +216,11 @@ def vertices(mesh) -> np.ndarray:
 
 def number_of_shape(block) -> int:
     """A number that changes when the points of a shape key do."""
-    return zlib.crc32(_coordinates(block))
+    return zlib.crc32(coordinates(block))
 
 
 def coordinates(block) -> np.ndarray:
-    """Points (V, 3) of a shape key of a mesh or a lattice."""
-    return _coordinates(block).astype(float)
-
-
-def _coordinates(block) -> np.ndarray:
+    """Points (V, 3) float32 of a shape key of a mesh or a lattice."""
     elements = getattr(block, "points", block.data)  # as a block, fifty times faster; not before Blender 4.1
     values = np.empty((len(elements), 3), np.float32)
     elements.foreach_get("co", values.ravel())

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The shape of what a rig stands on, rides on or runs along, except what animation writes: a ground, a saddle, a path."""
 
-import zlib
-
 from ...session import session
-from ..character.body import coordinates, number_of
+from ..character.body import number_of, number_of_shape
 from ..objects.animated import animated
 from ..objects.settings import as_set, settings_of
 
@@ -64,5 +62,5 @@ def _keys(keys) -> list:
     moving, found = animated(keys.animation_data) if keys else (), []
     for block in keys.key_blocks if keys else ():
         value = 0.0 if block.path_from_id("value") in moving else block.value
-        found += [block.name, block.mute, value, zlib.crc32(coordinates(block))]
+        found += [block.name, block.mute, value, number_of_shape(block)]
     return found
