@@ -40,6 +40,8 @@ class SampledRig:
     clip: Clip
     trim: np.ndarray
     """See `services.motion.trim_of`."""
+    reader: PoseReader
+    """Reads its pose anew."""
     key: tuple
     """What the sampling depended on besides the animation; see `scene.motion.sampled_from.key_of`."""
     bind_places: dict[str, np.ndarray]
@@ -115,7 +117,6 @@ class Session:
     """How live hair objects stood when last written, by identity, also those that are gone; see `joined`."""
     preparing: dict[str, tuple[Threaded, Callable[[str], None]]] = field(default_factory=dict)
     """Hair objects that a thread is preparing, with what is called with the name when that is done."""
-    readers: dict[str, PoseReader] = field(default_factory=dict)
     chains: dict[str, Bound] = field(default_factory=dict)
     models: dict[str, tuple[tuple, StrandModel]] = field(default_factory=dict)
     weights: dict[str, tuple[tuple, np.ndarray]] = field(default_factory=dict)
@@ -197,11 +198,10 @@ class Session:
             self.stop_preparing(hair)
             self.hairs.pop(hair, None)
         self.failed.discard(name)
-        self.readers.pop(name, None)
         self.chains.pop(name, None)
         self.messages.pop(name, None)
 
-    def renew_motion(self, name: str, sampled: SampledRig, reader) -> None:
+    def renew_motion(self, name: str, sampled: SampledRig) -> None:
         """Store an armature's sampled motion; hair prepared for the same character stays if the motion has it, and is checked before
         use.
         """
@@ -210,7 +210,7 @@ class Session:
         staying = sampled.motion.places.keys() if same else frozenset()
         self.forget_motion(name, staying)
         self.doubtful.update(staying)
-        self.rigs[name], self.readers[name] = sampled, reader
+        self.rigs[name] = sampled
 
     def clear(self) -> None:
         """Forget everything, at file load and when the add-on is disabled; whoever is stepping frames must still end that."""

@@ -22,8 +22,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
     evaluated = armature.evaluated_get(graph)
     if not evaluated.is_evaluated:
         raise hidden(armature)
-    reader = session.readers.get(armature.name_full)
-    if reader is None or tuple(armature.pose.bones.keys()) != reader.bones:
+    if tuple(armature.pose.bones.keys()) != sampled.reader.bones:
         session.forget_motion(armature.name_full)
         raise NeuralocksError(f"{armature.name_full}: its bones have changed; press Sample Motion")
     if moved and sampled.key[0] != timing_of(scene):
@@ -34,7 +33,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
                 f"hair may be wrong in the last render of scene '{scene.name}': it is rendered with other scenes that share the "
                 "character, but not the frame range, the frame rate, Time Stretching or Samples; give them the same",
             )
-    world = reader.world(evaluated) @ sampled.trim
+    world = sampled.reader.world(evaluated) @ sampled.trim
     row = sampled.motion.row(shown_frame(scene))
     if row is not None:
         same = same_pose(world, sampled.drawn[row])

@@ -75,7 +75,7 @@ def _sample(context, scene, armature) -> Iterator[tuple[int, int]]:
     for row in range(total):
         recording.take(row)
         yield row + 1, total
-    session.renew_motion(recording.name, (yield from recording.sampled()), recording.reader)
+    session.renew_motion(recording.name, (yield from recording.sampled()))
 
 
 class _Recording:
@@ -109,7 +109,7 @@ class _Recording:
         self._heads, self._shown = np.empty((count, 4, 4)), np.empty((count, 4, 4))
         self._places = {name: np.empty((count, 4, 4)) for name in ["", *self._tracked]}
         self._shapes, self._bodies_at, self._looked = [], {}, {count // 2, count - 1}
-        self.reader = None
+        self._reader = None
 
     def take(self, row: int) -> None:
         """Step to a frame and read it, in a view layer in which the armature moves, whichever is in view; objects are looked up
@@ -144,20 +144,20 @@ class _Recording:
         if not evaluated.is_evaluated:
             raise hidden(armature)
         if not row:
-            self.reader = armature_reader.PoseReader(armature, self._rig.bones)
+            self._reader = armature_reader.PoseReader(armature, self._rig.bones)
             here = armature_reader.matrix(evaluated.matrix_world)
             check_placed(here[None], self.frames, self.name)
             self._place = rig_service.stood_up(self._rig, here)
             self._bind = self._place @ self._rig.rest
             self._trim = trim_of(self._bind, self.name)
             placed = [*self._tracked, *self._rigid]
-            binds = bind_places(self._context, armature, placed, self.reader, self._rig.rest)
+            binds = bind_places(self._context, armature, placed, self._reader, self._rig.rest)
             # Not even rounding may move what already stands upright: hair pushed out of a body would jump.
             up = np.eye(4) if np.array_equal(self._place, here) else self._place @ np.linalg.inv(here)
             self._binds = {name: up @ bind for name, bind in binds.items()}
             graph = self._context.evaluated_depsgraph_get()
             evaluated = armature.evaluated_get(graph)
-        self.reader.record(evaluated, self._pose[row % self._block], self._basis[row % self._block])
+        self._reader.record(evaluated, self._pose[row % self._block], self._basis[row % self._block])
         self._places[""][row] = armature_reader.matrix(evaluated.matrix_world)
         for name, other in zip(self._tracked, tracked, strict=True):
             self._places[name][row] = world(other, graph)
@@ -171,7 +171,7 @@ class _Recording:
         """Convert the poses of some rows to channels."""
         rows, kept = slice(first, end), slice(end - first)
         check_placed(self._places[""][rows], self.frames[rows], self.name)
-        drawn = self.reader.posed(self._pose[kept], self._places[""][rows])
+        drawn = self._reader.posed(self._pose[kept], self._places[""][rows])
         joints = unhidden(drawn, self._rig, self._needed, self.frames[rows])
         part = Motion.from_world(
             frames=self.frames[rows],
@@ -188,7 +188,7 @@ class _Recording:
         world = part.world()
         self._parts.append(part)
         self._world[rows] = to_core(self._unit) @ world
-        self._drawn[rows], self._own[rows] = drawn @ self._trim, self.reader.own(self._basis[kept])
+        self._drawn[rows], self._own[rows] = drawn @ self._trim, self._reader.own(self._basis[kept])
         self._heads[rows], self._shown[rows] = joints[:, self._head], world[:, self._head]
 
     def _moved(self, joint: int) -> np.ndarray:
@@ -242,6 +242,7 @@ class _Recording:
             character,
             clip,
             self._trim,
+            self._reader,
             self._key,
             binds,
             stale=self._edits != session.edits,

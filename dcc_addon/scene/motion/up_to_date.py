@@ -37,12 +37,12 @@ def _as_sampled(context, armature, sampled: SampledRig) -> bool:
     with stepping(scene):
         for row in {0, len(frames) // 2, len(frames) - 1}:
             step(scene, frames[row])
-            layer, reader = layer_of(named(name), scene), session.readers.get(name)
-            if layer is None or reader is None:  # reported where hair is moved
+            layer = layer_of(named(name), scene)
+            if layer is None:  # reported where hair is moved
                 return True
             with working_in(scene, layer):
                 evaluated = named(name).evaluated_get(context.evaluated_depsgraph_get())
-                drawn = (reader.world(evaluated) @ sampled.trim)[read]
+                drawn = (sampled.reader.world(evaluated) @ sampled.trim)[read]
             if not same_pose(drawn, sampled.drawn[row, read]).all():
                 return False
     return True
