@@ -46,35 +46,33 @@ class SampledRig:
     """What the sampling depended on besides the animation; see `scene.motion.sampled_from.key_of`."""
     bind_places: dict[str, np.ndarray]
     """World transforms (4, 4) of hair and bodies in the bind pose, by name."""
-    stale: bool = False
+    stale: bool
     """Whether the animation has changed since."""
-
-    bind_metres: float = 1.0
+    bind_metres: float
     """Metres of one unit of the bind pose: the scene's unit scale, times the size at which the motion shows the head."""
-    drawn: np.ndarray = None
+    drawn: np.ndarray
     """Joints (T, J, 4, 4) in Blender's world space as Blender gave them, before conversion to channels, float32."""
-    own: np.ndarray = None
+    own: np.ndarray
     """Rotation and scale from the bones' own channels, without constraints, (T, J, 3, 3) float32."""
-    rigging: int = 0
+    rigging: int
     """The setup that moves the rig; see `scene.motion.sampled_from.rigging_of`."""
-    posture: int = 0
+    posture: int
     """The unkeyed pose; see `scene.motion.sampled_from.posture_of`."""
-    unreported: dict[str, int] = field(default_factory=dict)
+    unreported: dict[str, int]
     """Numbers of what Blender may not report of the bodies, by name; see `scene.motion.rigging.unreported`."""
-    moved_by: frozenset[str] = frozenset()
+    moved_by: frozenset[str]
     """Names of the objects that moved it; see `scene.motion.sampled_from.moved_by`."""
-
-    carriers: dict[str, int] = field(default_factory=dict)
+    carriers: dict[str, int]
     """Joints below the head that carry hair objects, by name: the jaw of a beard. All others ride on the head."""
-    carried: dict[int, Character] = field(default_factory=dict)
+    carried: dict[int, Character]
     """The character with each such joint, made once; see `carrying`."""
-    body_arrays: tuple[BodyArrays, ...] = ()
+    body_arrays: tuple[BodyArrays, ...]
     """The body meshes as they were read then: a mirror object may stand elsewhere beside the body in another frame."""
-    bodies_off: tuple[str, ...] = ()
+    bodies_off: tuple[str, ...]
     """Notes on what hair is kept out of elsewhere than where it is drawn, or not at all; see `scene.character.body_drawn`, `scene.character.rigid_parts`."""
-    leaps: tuple[str, ...] = ()
+    leaps: tuple[str, ...]
     """Notes on frames at which the character jumps; see `services.leaps`."""
-    hairs_off: dict[str, str] = field(default_factory=dict)
+    hairs_off: dict[str, str]
     """Notes on hair objects, by name, that do not move with the head; see `scene.character.riding`."""
 
     @property

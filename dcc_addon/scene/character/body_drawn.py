@@ -40,7 +40,7 @@ def drawn(mesh_object, graph) -> np.ndarray | None:
     return transformed(all_drawn[:own], matrix(evaluated.matrix_world))
 
 
-def all_told(armature, bodies: list, seen: dict, character, clip, unit: float) -> tuple[str, ...]:
+def all_told(armature, bodies: tuple, seen: dict, character, clip, unit: float) -> tuple[str, ...]:
     """Notes on the bodies of an armature that are drawn elsewhere than expected.
 
     Args:

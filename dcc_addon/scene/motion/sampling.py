@@ -93,9 +93,13 @@ class _Recording:
         self._bodies = [body.name_full for body in bodies]
         self._rigid = [part.name_full for part in rigid_parts.find(armature, bodies, self._scene)]
         self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
-        self._key, self._rigging = key_of(armature, self._scene), rigging_of(armature, self._scene)
-        self._posture, self._moved_by = posture_of(armature, self._scene), moved_by(armature, self._scene)
-        self._unreported = {body.name_full: unreported(body) for body in bodies}
+        self._depends = {
+            "key": key_of(armature, self._scene),
+            "rigging": rigging_of(armature, self._scene),
+            "posture": posture_of(armature, self._scene),
+            "unreported": {body.name_full: unreported(body) for body in bodies},
+            "moved_by": moved_by(armature, self._scene),
+        }
         self._edits = session.edits
         self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
         self._rate = rate_of(self._scene)
@@ -236,44 +240,29 @@ class _Recording:
         if before is not None and rig_service.same(before.character, character):
             character, carried = before.character, before.carried
         hairs = self._hairs()  # whoever works meanwhile may have deleted some
+        on_head = [hair for name, hair in hairs.items() if name not in carriers]
+        parts = [part for name in self._rigid if (part := find(name)) is not None]
+        bodies = tuple(body for body, _ in arrays)
         return SampledRig(
-            rig,
-            motion,
-            character,
-            clip,
-            self._trim,
-            self._reader,
-            self._key,
-            binds,
-            stale=self._edits != session.edits,
+            rig=rig,
+            motion=motion,
+            character=character,
+            clip=clip,
+            trim=self._trim,
+            reader=self._reader,
+            bind_places=binds,
             bind_metres=metres,
             drawn=self._drawn,
             own=self._own,
-            rigging=self._rigging,
-            posture=self._posture,
-            unreported=self._unreported,
-            moved_by=self._moved_by,
-            hairs_off=riding.strays_told(
-                [hair for name, hair in hairs.items() if name not in carriers],
-                rig,
-                self._heads,
-                self._moved,
-                self._places,
-                self._unit,
-            ),
+            **self._depends,
+            stale=self._edits != session.edits,
             carriers=carriers,
             carried=carried,
-            body_arrays=tuple(body for body, _ in arrays),
+            body_arrays=bodies,
             bodies_off=(
-                *body_drawn.all_told(
-                    armature, [body for body, _ in arrays], self._bodies_at, character, clip, self._unit
-                ),
-                *rigid_parts.told(
-                    armature,
-                    [part for name in self._rigid if (part := find(name)) is not None],
-                    list(hairs.values()),
-                    binds,
-                ),
+                *body_drawn.all_told(armature, bodies, self._bodies_at, character, clip, self._unit),
+                *rigid_parts.told(armature, parts, list(hairs.values()), binds),
             ),
             leaps=leaps_told(clip, character.head, motion.frames),
+            hairs_off=riding.strays_told(on_head, rig, self._heads, self._moved, self._places, self._unit),
         )
