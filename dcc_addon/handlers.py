@@ -8,7 +8,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from . import background
 from .live import model_updates, view
-from .live.live_strands import live_hairs, show_all_rest, show_rest_left
+from .live.live_strands import show_all_rest, show_rest_left
 from .live.models import SETTING
 from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
 from .scene.baked import as_groomed
@@ -154,10 +154,11 @@ def before_render(scene, *_):
     for drawn in drawn_with(scene):
         with working_in(drawn, layer_shown(drawn)):
             _make_ready(drawn)
-        for thing in [*live_hairs(drawn), *view.carriers(drawn)]:
+        hairs = lively(drawn.objects).hairs
+        for thing in [*hairs, *view.carriers(drawn)]:
             if thing.name_full in session.messages:
                 print(f"Neuralocks: {session.messages[thing.name_full]}")
-        for hair in live_hairs(drawn):
+        for hair in hairs:
             blur.begin(hair, drawn)
 
 

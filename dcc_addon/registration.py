@@ -6,6 +6,7 @@ import bpy
 from . import background, handlers, operators
 from .interface import menu, panels, preferences, properties
 from .live import live_rig, live_strands, preparing
+from .scene.objects.lively import lively
 from .session import session
 
 CLASSES = (*properties.CLASSES, *preferences.CLASSES, *operators.CLASSES, *panels.CLASSES, *menu.CLASSES)
@@ -30,9 +31,10 @@ def unregister() -> None:
     operators.training.stop()
     handlers.detach()
     for scene in bpy.data.scenes:
-        for hair in live_strands.live_hairs(scene):
+        own = lively(scene.objects)
+        for hair in own.hairs:
             live_strands.rest(hair)
-        for armature in live_rig.live_armatures(scene):
+        for armature in own.armatures:
             live_rig.rest(armature)
     live_strands.show_all_rest()
     session.clear()

@@ -7,18 +7,12 @@ from neuralocks_core.rig import RigModel
 from ..kept import Bound
 from ..scene.drawing.clock import shown_frame
 from ..scene.keys import rotations
-from ..scene.objects.lively import lively
 from ..services.bones import LiveBones
 from ..session import session
 from .blowing import in_core
 from .models import model_path, stamp
 from .pose import pose
 from .unsampled import unsampled
-
-
-def live_armatures(scene) -> list:
-    """Armatures of the scene whose hair bones are live."""
-    return lively(scene.objects).armatures
 
 
 def update(armature, scene, graph, moved: bool = False) -> None:

@@ -22,7 +22,6 @@ from ..scene.drawing.windows import drawing, layer_shown
 from ..scene.files.paths import check_found
 from ..scene.hair import curves
 from ..scene.hair.muting import mute_deformers, unmute_deformers
-from ..scene.objects.lively import lively
 from ..scene.objects.lookup import find, identity, in_scene
 from ..services import rig as rig_service
 from ..services.axes import to_core
@@ -37,11 +36,6 @@ from .pose import pose
 from .unsampled import unsampled
 
 EDITING = {"EDIT", "EDIT_CURVES", "SCULPT_CURVES"}
-
-
-def live_hairs(scene) -> list:
-    """Hair objects of the scene that are live."""
-    return lively(scene.objects).hairs
 
 
 def update(hair, scene, graph, moved: bool, wait: bool, home=None) -> None:

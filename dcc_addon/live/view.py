@@ -97,9 +97,10 @@ def _update_guest(thing, home, scene, graph, wait: bool) -> None:
 
 def show_rest(scene) -> None:
     """Show all live hair of a scene as it was groomed, until somebody refreshes it."""
-    for hair in live_strands.live_hairs(scene):
+    own = lively(scene.objects)
+    for hair in own.hairs:
         live_strands.show_rest(hair)
-    for armature in live_rig.live_armatures(scene):
+    for armature in own.armatures:
         live_rig.show_rest(armature)
 
 
