@@ -6,6 +6,7 @@ a large scene, or reading a large one, takes longer than that may take: both are
 import bpy
 
 from ...session import session
+from ..character.binding import deforming
 from ..character.body import number_of, number_of_shape, weighed_so
 from ..character.carried import bodies_of
 from ..motion.rigging import number_of_keys
@@ -33,7 +34,7 @@ def numbers_of_bodies(armature, scene) -> tuple[int | None, int | None]:
     if key not in session.bodies:
         bodies = bodies_of(armature, scene)
         shapes, driven = sorted(map(_number_of, bodies)), [number_of_drivers(body.data) for body in bodies]
-        known = bodies or _has_mesh(armature, scene)
+        known = bodies or any(armature in deforming(thing) for thing in scene.objects if thing.type == "MESH")
         numbers = recorded.number_of(shapes), recorded.number_of(sorted(filter(None, driven)))
         session.bodies[key] = numbers if known else (None, None)
     return session.bodies[key]
@@ -68,9 +69,7 @@ def _regroups(update) -> bool:
     return not isinstance(thing, APART)
 
 
-def _has_mesh(armature, scene) -> bool:
-    meshes = (thing for thing in scene.objects if thing.type == "MESH")
-    return any(each.type == "ARMATURE" and each.object == armature for thing in meshes for each in thing.modifiers)
+
 
 
 def _number_of(body) -> int:
@@ -91,8 +90,7 @@ def _replayed(actions: set) -> set[str]:
 def _surface(body) -> list:
     mesh, keys = body.data, body.data.shape_keys
     count, groups, weights = weighed_so(body)
-    rigs = (each.object for each in body.modifiers if each.type == "ARMATURE")
-    bones = {bone.name for rig in rigs if rig is not None for bone in rig.data.bones}
+    bones = {bone.name for rig in deforming(body) for bone in rig.data.bones}
     # Groups of pins and masks move nothing, and their order says nothing.
     weighed = sorted(weight for group, weight in weights if group < len(groups) and groups[group] in bones)
     found = [count, len(mesh.polygons), weighed]

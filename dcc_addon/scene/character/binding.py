@@ -121,7 +121,7 @@ def apart_at_rest(thing, armature) -> bool:
     pose, so its place there means nothing.
     """
     others = armatures_of(thing) - {armature}
-    joined = (other for other in others if any(armature in _reached(t.target, set()) for t in _bone_targets(other)))
+    joined = (other for other in others if any(armature in armatures_of(t.target) for t in _bone_targets(other)))
     return any(armature not in armatures_of(other) for other in joined)
 
 
