@@ -13,7 +13,7 @@ from ..files.paths import check_own, full
 from ..files.save_as import named_here
 from ..hair import blur, cached_strands
 from ..hair.muting import CACHE as MODIFIER
-from ..hair.muting import mute_deformers, off_meanwhile, unmute_deformers
+from ..hair.muting import caches_of_others, mute_deformers, off_meanwhile, unmute_deformers
 from . import as_baked, as_groomed
 from .rewritten import read_again
 
@@ -63,8 +63,7 @@ def players(path: str) -> list:
 def is_imported(path: str) -> bool:
     """Whether something in this file was imported from the USD file `path`, and still plays it: not the add-on's own caches."""
     for thing in bpy.data.objects:
-        found = [m for m in thing.modifiers if m.type == "MESH_SEQUENCE_CACHE" and m.name != MODIFIER]
-        found += [c for c in thing.constraints if c.type == "TRANSFORM_CACHE"]
+        found = [*caches_of_others(thing), *(c for c in thing.constraints if c.type == "TRANSFORM_CACHE")]
         if any(each.cache_file is not None and _is(each.cache_file, path) for each in found):
             return True
     return False
@@ -109,9 +108,8 @@ def attach(hair, path: str, prim: str, scene, frames: tuple[int, int]) -> None:
     modifier.cache_file = cache
     modifier.object_path = prim
     if len(hair.modifiers) > 1 and _original(hair, modifier) is None:
-        index = hair.modifiers.find(MODIFIER)
         if hasattr(hair.modifiers, "move"):
-            hair.modifiers.move(index, 0)
+            hair.modifiers.move(hair.modifiers.find(MODIFIER), 0)
     cached_strands.remember(hair.data)
     blur.attach(hair)
 

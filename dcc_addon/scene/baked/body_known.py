@@ -69,9 +69,6 @@ def _regroups(update) -> bool:
     return not isinstance(thing, APART)
 
 
-
-
-
 def _number_of(body) -> int:
     """Of its surface, known as long as the same shape keys are animated: older Blenders do not tell of a driver that is removed."""
     mesh = body.data

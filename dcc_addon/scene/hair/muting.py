@@ -85,11 +85,9 @@ def off_meanwhile(hair) -> list[str]:
     return [name for name in dict.fromkeys(found) if name in hair.modifiers]
 
 
-def caches_of_others(hair) -> list:
-    """Modifiers that play a cache which is not of this add-on: an importer makes the shape of one of its frames the shape of the
-    curves.
-    """
-    return [m for m in hair.modifiers if m.type == "MESH_SEQUENCE_CACHE" and m.name != CACHE]
+def caches_of_others(thing) -> list:
+    """Modifiers that play a cache which is not of this add-on: an importer makes the shape of one of its frames the shape of the object."""
+    return [m for m in thing.modifiers if m.type == "MESH_SEQUENCE_CACHE" and m.name != CACHE]
 
 
 def on_top(hair) -> list[str]:
