@@ -22,13 +22,10 @@ def changed(told, now: dict[str, int | None], fewest: int) -> list[str]:
     """Which parts have other numbers `now` than in `told`, which may lack the last ones; none if it has not even the `fewest`, and so
     is something else. What is unknown counts as the same.
     """
-    then = str(told).split(" ")
+    then, today = str(told).split(" "), as_text(now).split(" ")
     if not fewest <= len(then) <= len(now):
         return []
-    known = [
-        (part, old, number) for part, old, number in zip(now, then, now.values()) if "-" != old and number is not None
-    ]
-    return [part for part, old, number in known if old != f"{number:08x}"]
+    return [part for part, old, new in zip(now, then, today) if old != new and "-" not in (old, new)]
 
 
 def note(parts: list[str], remedy: str) -> str:
