@@ -20,7 +20,8 @@ class Unkeyed:
     """Channels of all animated objects of a scene, and whatever else keys write, as they are now."""
 
     def __init__(self, scene):
-        self._kept = {o.name_full: _channels(o) for o in scene.objects if o.library is None and _animated(o)}
+        own = (thing for thing in scene.objects if thing.library is None)
+        self._kept = {o.name_full: _channels(o) for o in own if _has_keys(o) or _has_keys(_keys(o))}
         self._others = [
             (kind, thing.name, within, path, value)
             for kind in _kinds()
@@ -80,10 +81,9 @@ def _owner(thing, within: bool):
 
 def _written(owner, placed: bool) -> list[tuple[str, object]]:
     """Paths that animation writes, and their values; without those of PLACE if it is `placed`, as objects are."""
-    data = getattr(owner, "animation_data", None)
-    if data is None or not (data.action is not None or len(data.nla_tracks)):
+    if not _has_keys(owner):
         return []
-    paths = [path for path in animated(data) if not (placed and _CHANNEL.fullmatch(path))]
+    paths = [path for path in animated(owner.animation_data) if not (placed and _CHANNEL.fullmatch(path))]
     return [(path, value) for path in paths if (value := value_of(owner, path)) is not None]
 
 
@@ -100,10 +100,10 @@ def _write(owner, path: str, value) -> None:
     owner.update_tag()
 
 
-def _animated(thing) -> bool:
-    keys = _keys(thing)
-    sources = (thing.animation_data, keys.animation_data if keys is not None else None)
-    return any(data is not None and (data.action is not None or len(data.nla_tracks)) for data in sources)
+def _has_keys(owner) -> bool:
+    """Whether a data block, if it is one, has an action or NLA tracks."""
+    data = getattr(owner, "animation_data", None)
+    return data is not None and (data.action is not None or len(data.nla_tracks) > 0)
 
 
 def _keys(thing):
