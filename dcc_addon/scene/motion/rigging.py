@@ -12,7 +12,7 @@ import numpy as np
 from ..character.body import up_to_armature, weighed_so
 from ..keys.hair_keys import HAIR, as_before
 from ..objects import recorded
-from ..objects.animated import animated, curves_of, strips_of, written
+from ..objects.animated import animated, curves_of, strips_of, targets_of, written
 from ..objects.settings import as_set, objects_named, settings_of
 from .shapes import shape
 from .unkeyed import PLACE, value_of
@@ -68,9 +68,7 @@ def reached(things) -> list:
         for constraint in [*thing.constraints, *(c for bone in bones for c in bone.constraints)]:
             others += objects_named(constraint)
             others += [target.target for target in getattr(constraint, "targets", ())]
-        for data in _animation(thing):
-            drivers = [curve.driver for curve in data.drivers]
-            others += [target.id for d in drivers for variable in d.variables for target in variable.targets]
+        others += [target.id for data in _animation(thing) for _, target in targets_of(data)]
         for other in others:
             if isinstance(other, bpy.types.Object) and other.name_full not in found:
                 found[other.name_full] = other
@@ -174,8 +172,7 @@ def _lists(owner, start: str, moving: set[str]) -> list:
 def _read(data) -> list:
     """What drivers read, and no animation writes, of anything but objects' places."""
     found, known = [], {}  # hundreds of drivers may read one rig
-    variables = [variable for curve in data.drivers for variable in curve.driver.variables]
-    for variable, target in [(each, target) for each in variables for target in each.targets]:
+    for variable, target in targets_of(data):
         path, owner = target.data_path, target.id
         if variable.type == "CONTEXT_PROP":  # of the scene or the view layer that is shown
             owner = bpy.context.scene if target.context_property == "ACTIVE_SCENE" else bpy.context.view_layer

@@ -3,7 +3,7 @@
 
 from ...session import session
 from ..character.body import number_of, number_of_shape
-from ..objects.animated import animated
+from ..objects.animated import animated, targets_of
 from ..objects.settings import as_set, settings_of
 
 CURVE = (
@@ -36,8 +36,7 @@ def follows(mesh, others) -> bool:
     some of them, too.
     """
     data = mesh.shape_keys.animation_data if mesh.shape_keys else None
-    variables = [variable for curve in data.drivers for variable in curve.driver.variables] if data else []
-    read = {target.id for variable in variables for target in variable.targets if target.id in others}
+    read = {target.id for _, target in targets_of(data) if target.id in others} if data else set()
     if all(each in (mesh, mesh.shape_keys) or getattr(each, "data", None) == mesh for each in read):
         return False
     return session.vertices.get(mesh.name_full) == number_of(mesh)

@@ -36,6 +36,12 @@ def curves_of(data, without=()) -> list:
     return [*data.drivers, *(curve for user in (data, *strips_of(data, without)) for curve in _curves(user))]
 
 
+def targets_of(data) -> list[tuple]:
+    """What the drivers of some animation data read: each target, after the variable that it belongs to."""
+    variables = [variable for curve in data.drivers for variable in curve.driver.variables]
+    return [(variable, target) for variable in variables for target in variable.targets]
+
+
 def is_muted(curve) -> bool:
     """Whether an F-curve does not play."""
     return curve.mute or (curve.group is not None and curve.group.mute)
