@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from neuralocks_core.rotation import relative_to_parents
+
 from ..services import names
 from ..services.axes import to_core
 from ..services.rig import joint_weights, shape_names, skin
@@ -40,17 +42,14 @@ def write_shot(path: Path, armature, sampled, hairs, undrawn=(), share: float = 
     motion, rig = sampled.motion, sampled.rig
     bind = np.linalg.inv(to_core(sampled.bind_metres)) @ sampled.character.skeleton.bind
     labels, skins = names.unique([f"Hair_{h.name}" for h in hairs]), _skins(sampled)
-    rest = bind.copy()
-    for joint, parent in enumerate(rig.parents):
-        if parent >= 0:
-            rest[joint] = np.linalg.inv(bind[parent]) @ bind[joint]
+
     arrays = SceneArrays(
         metres_per_unit=motion.metres_per_unit,
         rate=motion.rate,
         frames=motion.frames,
         joints=rig.paths,
         bind=bind,
-        rest=rest,
+        rest=relative_to_parents(bind, rig.parents),
         translation=motion.translation,
         rotation=motion.rotation,
         scale=motion.scale,
