@@ -136,7 +136,7 @@ class Motion:
 
     @classmethod
     def from_world(
-        cls, frames, rate, metres_per_unit, parents, bind, joints, shape, places, subject="armature", head=None
+        cls, frames, rate, metres_per_unit, parents, bind, joints, shape, subject="armature", head=None
     ) -> "Motion":
         """From world transforms.
 
@@ -149,7 +149,6 @@ class Motion:
             parents: (J,) int, -1 for a root.
             bind: world transforms of every joint in the bind pose, (J, 4, 4); joints: over time, (T, J, 4, 4).
             shape: blend shape weights (T, B).
-            places: world transforms (T, 4, 4) of other objects, by name.
             subject: name of the armature in messages.
             head: the joint that carries the hair, whose own transform counts most where bones are scaled unevenly.
 
@@ -178,7 +177,6 @@ class Motion:
             rotation=rotation,
             scale=scale,
             shape=np.asarray(shape, np.float32),
-            places=dict(places),
         )
 
     @classmethod

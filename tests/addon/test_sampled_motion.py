@@ -39,7 +39,7 @@ def _motion(rng, scale=1.0, stretch=0.0):
 def test_stored_channels_give_the_sampled_poses_back(scale):
     """Also for an armature object of any scale, although scales of a SkelAnimation have half precision."""
     bind, world = _motion(np.random.default_rng(0), scale)
-    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {"": None})
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)))
     apart = motion.world() - world @ np.diag([1 / scale, 1 / scale, 1 / scale, 1])
     assert np.abs(apart[..., :3, :3]).max() < 1e-6
     assert np.abs(apart[..., :3, 3]).max() < 1e-6 * scale
@@ -55,7 +55,7 @@ def test_rounding_does_not_add_up_along_a_chain():
     world, parents = local.copy(), np.arange(count) - 1
     for joint in range(1, count):
         world[:, joint] = world[:, joint - 1] @ local[:, joint]
-    motion = Motion.from_world(np.arange(3), 24, 1.0, parents, world[0], world, np.zeros((3, 0)), {})
+    motion = Motion.from_world(np.arange(3), 24, 1.0, parents, world[0], world, np.zeros((3, 0)))
     apart = np.abs(motion.world() - world)[..., :3, :].max(axis=(0, 2, 3))
     assert apart[150:].max() < 3 * apart[:50].max()
 
@@ -84,10 +84,10 @@ def _stretched(rng, apart=()):
 
 def test_channels_carry_what_is_stretched_along_a_chain():
     world = _stretched(np.random.default_rng(5))
-    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, rest(), world, np.zeros((9, 0)), {}, head=3)
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, rest(), world, np.zeros((9, 0)), head=3)
     assert np.abs(motion.world() - world).max() < 2e-3
     parts = [
-        Motion.from_world(np.arange(9)[r], 24, 1.0, PARENTS, rest(), world[r], np.zeros((9, 0))[r], {}, head=3)
+        Motion.from_world(np.arange(9)[r], 24, 1.0, PARENTS, rest(), world[r], np.zeros((9, 0))[r], head=3)
         for r in (slice(2), slice(2, 9))
     ]
     assert np.array_equal(Motion.joined(parts, {}).world(), motion.world())
@@ -96,7 +96,7 @@ def test_channels_carry_what_is_stretched_along_a_chain():
 def test_a_head_that_inherits_no_stretch_is_exact():
     """Joints below it have one scale, because a chain cannot carry both; all stay in place."""
     world = _stretched(np.random.default_rng(6), apart=(3,))
-    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, rest(), world, np.zeros((9, 0)), {}, head=3)
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, rest(), world, np.zeros((9, 0)), head=3)
     made = motion.world()
     assert np.abs(made[:, 3] - world[:, 3]).max() < 1e-3
     assert np.abs(made[..., :3, 3] - world[..., :3, 3]).max() < 1e-3
@@ -106,7 +106,7 @@ def test_a_head_that_inherits_no_stretch_is_exact():
 def test_an_unevenly_scaled_object_is_part_of_its_bind_pose():
     """At rest its joints are where they were bound, without scale."""
     place = np.diag([1.1, 1.0, 0.9, 1.0])
-    motion = Motion.from_world([0], 24, 1.0, PARENTS, place @ rest(), (place @ rest())[None], np.zeros((1, 0)), {})
+    motion = Motion.from_world([0], 24, 1.0, PARENTS, place @ rest(), (place @ rest())[None], np.zeros((1, 0)))
     arrays = rig.RigArrays("Rig", BONES, PARENTS, rest())
     assert np.abs(motion.world()[0] - rig.bind_world(arrays, place)).max() < 1e-6
 
@@ -123,7 +123,7 @@ def test_the_gap_of_a_loop_is_the_one_that_a_bake_tells():
     for row, turn in enumerate(np.radians([0.0, 0.9, 1.8])):
         for joint in range(count):
             world[row, joint, :3, :3] = from_vector(np.array([0.0, 0.0, (joint + 1) * turn]))
-    motion = Motion.from_world(np.arange(3), 24, 1.0, parents, world[0], world, np.zeros((3, 0)), {})
+    motion = Motion.from_world(np.arange(3), 24, 1.0, parents, world[0], world, np.zeros((3, 0)))
     assert motion.gap == pytest.approx(10.8, abs=1e-3)
     assert motion.gap == pytest.approx(loop_turns(world[[0, -1]]).max(), abs=1e-3)
     assert replace(motion, rotation=motion.rotation[[0, 1, 0]]).gap == 0
@@ -131,7 +131,7 @@ def test_the_gap_of_a_loop_is_the_one_that_a_bake_tells():
 
 def test_samples_are_found_by_frame():
     bind, world = _motion(np.random.default_rng(2))
-    motion = Motion.from_world(np.arange(9) / 2 + 3, 25, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
+    motion = Motion.from_world(np.arange(9) / 2 + 3, 25, 1.0, PARENTS, bind, world, np.zeros((9, 0)))
     assert [motion.row(f) for f in (3, 3.5, 7, 2, 3.3, 7.5)] == [0, 1, 8, None, None, None]
     assert motion.times[-1] == 7 / 25
 
@@ -159,7 +159,7 @@ def test_a_character_is_measured_at_the_size_shown(size):
     """Bones scale the head: it stands as it is drawn, and the bind pose is as large as its hair."""
     bind, world = _motion(np.random.default_rng(4))
     world[:, 3, :3, :3] *= size
-    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
+    motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)))
     shown = rig.size_shown(rig.RigArrays("Rig", BONES, PARENTS, rest()), np.eye(4), motion.world()[:, 3])
     assert shown == pytest.approx(size, rel=1e-3)
 
@@ -174,7 +174,7 @@ def test_a_head_that_no_bone_scales_is_exactly_as_large_as_in_the_bind_pose():
         place = np.eye(4)
         place[:3, :3] = 1.3 * from_vector(turn)
         bind, posed = rig.bind_world(armature, place), place @ world @ np.diag([1 / 1.3, 1 / 1.3, 1 / 1.3, 1])
-        motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, posed, np.zeros((9, 0)), {})
+        motion = Motion.from_world(np.arange(9), 24, 1.0, PARENTS, bind, posed, np.zeros((9, 0)))
         assert rig.size_shown(armature, place, motion.world()[:, 3]) == 1.0
 
 
@@ -219,7 +219,7 @@ def test_a_motion_in_parts_is_the_whole():
     frames, shape, places = np.arange(9), np.arange(18.0).reshape(9, 2), {"": world[:, 0]}
 
     def of(rows):
-        return Motion.from_world(frames[rows], 24, 1.0, PARENTS, bind, world[rows], shape[rows], {})
+        return Motion.from_world(frames[rows], 24, 1.0, PARENTS, bind, world[rows], shape[rows])
 
     whole, joined = of(slice(9)), Motion.joined([of(slice(4)), of(slice(4, 9))], places)
     for name in ("frames", "translation", "rotation", "scale", "shape"):
@@ -231,7 +231,7 @@ def test_a_sample_is_found_by_the_frame_that_blender_shows():
     """Blender's fractions of frames have single precision; between the samples there is none."""
     bind, world = _motion(np.random.default_rng(4))
     frames = frame_numbers(-1, 2, 3)[:9]
-    motion = Motion.from_world(frames, 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)), {})
+    motion = Motion.from_world(frames, 24, 1.0, PARENTS, bind, world, np.zeros((9, 0)))
     for row, frame in enumerate(frames):
         whole = int(np.floor(frame))
         for near in (whole + float(np.float32(frame - whole)), frame - 1e-7, frame + 1e-7):

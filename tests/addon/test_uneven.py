@@ -38,7 +38,7 @@ def _bind():
 def test_below_a_stretched_limb_nothing_runs_away(stretch):
     """All joints stay in place; for those that cannot keep their shape, the error does not grow down the chain."""
     world = _limb(stretch)
-    made = Motion.from_world(FRAMES, 24, 1.0, PARENTS, _bind(), world, np.zeros((12, 0)), {}, head=1).world()
+    made = Motion.from_world(FRAMES, 24, 1.0, PARENTS, _bind(), world, np.zeros((12, 0)), head=1).world()
     assert np.abs(made[..., :3, 3] - world[..., :3, 3]).max() < 1e-4
     off = np.linalg.norm((made - world)[..., :3, :3], ord=2, axis=(-2, -1)).max(axis=0)
     assert off[:3].max() < 1e-3

@@ -185,7 +185,6 @@ class _Recording:
             bind=self._bind,
             joints=joints,
             shape=np.array(self._shapes[rows]),
-            places={},
             subject=self.name,
             head=self._head,
         )
