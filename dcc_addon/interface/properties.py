@@ -24,16 +24,9 @@ KEPT = {"options": {"HIDDEN"}} | OVERRIDABLE
 """Hidden from the artist."""
 
 
-def _is_armature(_self, candidate) -> bool:
-    return candidate.type == "ARMATURE"
-
-
-def _is_mesh(_self, candidate) -> bool:
-    return candidate.type == "MESH"
-
-
-def _is_hair(_self, candidate) -> bool:
-    return candidate.type == "CURVES"
+def _objects(kind: str) -> dict:
+    """Arguments of a property that points to objects of this type."""
+    return {"type": bpy.types.Object, "poll": lambda _self, candidate: candidate.type == kind}
 
 
 def by_script(context) -> bool:
@@ -46,12 +39,12 @@ def _live_changed(hair_settings, context) -> None:
     background.request()
 
 
-def _carrier_changed(hair_settings, context) -> None:
-    _look_changed(hair_settings, context)
+def _carrier_changed(settings, context) -> None:
+    _look_changed(settings, context)
     background.request()
 
 
-def _look_changed(hair_settings, context) -> None:
+def _look_changed(_settings, context) -> None:
     view.refresh(context.scene, wait=by_script(context))
 
 
@@ -60,7 +53,7 @@ def _rig_live_changed(character, context) -> None:
     background.request()
 
 
-def _rig_look_changed(character, context) -> None:
+def _rig_look_changed(_character, context) -> None:
     view.refresh(context.scene)
 
 
@@ -85,10 +78,6 @@ def _range_changed(_settings, context) -> None:
     background.request()
 
 
-def _wind_changed(_character, context) -> None:
-    view.refresh(context.scene, wait=by_script(context))
-
-
 def _loop_changed(character, context) -> None:
     view.loop_changed(character.id_data, context.scene)
 
@@ -99,8 +88,7 @@ class HairSettings(bpy.types.PropertyGroup):
     armature: PointerProperty(
         name="Armature",
         description="The rig whose head carries this hair",
-        type=bpy.types.Object,
-        poll=_is_armature,
+        **_objects("ARMATURE"),
         update=_carrier_changed,
         **SETTING,
     )
@@ -150,8 +138,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     body: PointerProperty(
         name="Body",
         description="The skin mesh that the armature moves; found automatically if empty",
-        type=bpy.types.Object,
-        poll=_is_mesh,
+        **_objects("MESH"),
         update=_character_changed,
         **SETTING,
     )
@@ -174,7 +161,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         default=0.0,
         min=0.0,
         max=STRONGEST,
-        update=_wind_changed,
+        update=_look_changed,
         **SETTING,
     )
     wind_direction: FloatProperty(
@@ -184,7 +171,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         default=0.0,
         min=-2 * math.pi,
         max=2 * math.pi,
-        update=_wind_changed,
+        update=_look_changed,
         **SETTING,
     )
     gusts: FloatProperty(
@@ -194,7 +181,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
-        update=_wind_changed,
+        update=_look_changed,
         **SETTING,
     )
     rig_model: StringProperty(
@@ -239,12 +226,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
 class SceneSettings(bpy.types.PropertyGroup):
     """The settings of a scene: what the panel works on, and where bakes go."""
 
-    armature: PointerProperty(
-        name="Armature", description="The character shown in this panel", type=bpy.types.Object, poll=_is_armature
-    )
-    hair: PointerProperty(
-        name="Hair", description="The hair Curves object shown in this panel", type=bpy.types.Object, poll=_is_hair
-    )
+    armature: PointerProperty(name="Armature", description="The character shown in this panel", **_objects("ARMATURE"))
+    hair: PointerProperty(name="Hair", description="The hair Curves object shown in this panel", **_objects("CURVES"))
     use_scene_range: BoolProperty(
         name="Scene Range", description="Bake the frames of the scene", default=True, update=_range_changed
     )
