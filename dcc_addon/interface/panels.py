@@ -74,20 +74,17 @@ def _motion(layout, armature, scene) -> None:
         row.label(text=f"{len(sampled.motion.frames)} frames", icon="CHECKMARK")
     row.prop(character, "loop", text="", icon="LOOP_FORWARDS")
     row.operator("neuralocks.sample_motion", text="", icon="FILE_REFRESH")
-    width = None if sampled is None else sampled.character.head_width
-    if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
-        words(layout, f"The head is {width:.2g} m wide; check the scene's Unit Scale or the armature's scale", "ERROR")
-    if character.loop and sampled is not None:
-        gap = sampled.motion.gap
-        if gap > LOOP_GAP:
-            first, last = sampled.motion.frames[[0, -1]]
-            words(layout, f"Frame {last:g} differs from frame {first:g} by {gap:.0f} degrees", "ERROR")
-    elif sampled is not None:
+    if sampled is not None:
+        width = sampled.character.head_width
+        if width is not None and not HEAD_WIDTHS[0] < width < HEAD_WIDTHS[1]:
+            text = f"The head is {width:.2g} m wide; check the scene's Unit Scale or the armature's scale"
+            words(layout, text, "ERROR")
         first, last = sampled.motion.frames[[0, -1]]
-        if not first <= scene.frame_current <= last:
-            words(
-                layout, f"Hair only knows the motion of frames {first:g} to {last:g}; widen the scene's range", "INFO"
-            )
+        if character.loop and (gap := sampled.motion.gap) > LOOP_GAP:
+            words(layout, f"Frame {last:g} differs from frame {first:g} by {gap:.0f} degrees", "ERROR")
+        if not character.loop and not first <= scene.frame_current <= last:
+            text = f"Hair only knows the motion of frames {first:g} to {last:g}; widen the scene's range"
+            words(layout, text, "INFO")
     if not character.loop and begins_later(scene):
         words(layout, f"Hair begins at rest at frame {frames_of(scene)[0]}: {LATER}", "INFO")
     if sampled is not None:
@@ -147,10 +144,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             layout.operator("neuralocks.assign", icon="LINKED")
         layout.prop(own, "model", **hint(unnamed_model(hair)))
         _training(layout, settings, "strands")
-        row = layout.row()
-        row.scale_y = 1.5
-        row.use_property_split = False
-        row.prop(own, "live", toggle=True, icon="PAUSE" if own.live else "PLAY")
+        _switch(layout, own, "live")
         if hair.name_full in session.preparing:
             done = session.preparing[hair.name_full][0].done
             progress(layout, done, f"Preparing {100 * done:.0f} %, Live cancels")
@@ -172,6 +166,14 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
         layout.operator("neuralocks.report_card", text="Report Card", icon="PRESET")
         for line in session.cards.get(hair.name_full, ()):
             words(layout, line, "NONE")
+
+
+def _switch(layout, own, name: str) -> None:
+    """The large button of a Live setting."""
+    row = layout.row()
+    row.scale_y = 1.5
+    row.use_property_split = False
+    row.prop(own, name, toggle=True, icon="PAUSE" if getattr(own, name) else "PLAY")
 
 
 def _training(layout, settings, kind: str) -> None:
@@ -222,10 +224,7 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
             words(layout, line, "NONE")
         layout.prop(own, "rig_model", **hint("Shipped with the add-on"))
         _training(layout, settings, "rig")
-        row = layout.row()
-        row.scale_y = 1.5
-        row.use_property_split = False
-        row.prop(own, "rig_live", toggle=True, icon="PAUSE" if own.rig_live else "PLAY")
+        _switch(layout, own, "rig_live")
         layout.prop(own, "rig_motion", slider=True)
         message(layout, armature.name_full)
         row = layout.row(align=True)
