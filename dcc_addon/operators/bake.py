@@ -25,7 +25,7 @@ from ..scene.hair.muting import on_top
 from ..scene.objects.lookup import named
 from ..services.names import file_label
 from ..services.overwriting import untaken
-from ..services.panel_errors import for_the_panel, with_objects
+from ..services.panel_errors import for_the_panel
 from ..services.temporary import temporary_folder
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
@@ -101,7 +101,7 @@ def bake_steps(context, armature, hairs, path: str, undrawn=(), attached: bool =
             told = yield from _baking(out, look, begin, end, loop=sampled.clip.loop, **options)
             baked |= {name: (str(out), prims[name]) for name in names}
             written |= prims
-            notes += [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in told]
+            notes += [for_the_panel(sampled.rig.said(note), prims) for note in told]
     for out in outs:
         attach.renew(str(out), {name: prim for name, (_, prim) in baked.items()}, scene, (first, last))
     return Baked(baked, list(dict.fromkeys(notes)), written, (first, last))
@@ -219,7 +219,7 @@ def _card(path: str, prims: dict[str, str]):
     from usd.review.evaluate import evaluate
 
     measuring = Threaded(lambda say: evaluate(path, progress=say), "Measuring the hair")
-    return [for_the_panel(with_objects(line, prims)) for line in lines_of((yield from measuring.steps()))]
+    return [for_the_panel(line, prims) for line in lines_of((yield from measuring.steps()))]
 
 
 CLASSES = (NEURALOCKS_OT_bake, NEURALOCKS_OT_bake_attach, NEURALOCKS_OT_detach, NEURALOCKS_OT_report)

@@ -24,7 +24,7 @@ from ..services.bones import LiveBones, chains_of, own_turns
 from ..services.motion import frame_numbers
 from ..services.names import file_label
 from ..services.overwriting import check_ours, untaken
-from ..services.panel_errors import for_the_panel, with_objects
+from ..services.panel_errors import for_the_panel
 from ..services.threaded import Threaded, loading
 from ..services.unfinished import undone_on_failure
 from ..session import session
@@ -143,7 +143,7 @@ class NEURALOCKS_OT_export_skel(Stepwise, bpy.types.Operator):
                 "Baking the hair bones",
             )
             result = yield from job.steps(0.5)
-        notes = [for_the_panel(with_objects(sampled.rig.said(note), prims)) for note in result.notes]
+        notes = [for_the_panel(sampled.rig.said(note), prims) for note in result.notes]
         tell(self, f"{name}: hair bones written to {out}", notes)
 
 

@@ -22,7 +22,7 @@ from ..scene.files.save_as import named_here, set_path
 from ..scene.hair import curves
 from ..scene.objects.lookup import find, identified, identity, named
 from ..services.names import file_label
-from ..services.panel_errors import for_the_panel, with_objects
+from ..services.panel_errors import for_the_panel
 from ..services.temporary import temporary_folder
 from ..services.threaded import Threaded, loading
 from ..services.trainers import Trainers
@@ -198,7 +198,7 @@ class _Training(NamedTuple):
 
     def notes(self) -> list[str]:
         """Its notes, about objects and in the words of the panel."""
-        return [for_the_panel(with_objects(note, self.prims)) for note in self.job.notes]
+        return [for_the_panel(note, self.prims) for note in self.job.notes]
 
 
 def finish() -> str | None:

@@ -51,20 +51,20 @@ _JOINT = re.compile(r"joint '(?:[^']*/)?([^'/]+)'")
 """A bone as it is written to a file, with all bones above it."""
 
 
-def for_the_panel(text: str) -> str:
-    """The line of an error or a note, without options and commands of a terminal."""
+def for_the_panel(text: str, prims: dict[str, str] | None = None) -> str:
+    """The line of an error or a note, without options and commands of a terminal.
+
+    Args:
+        prims: prim path by object name; where the line names one of these prims, it then names the object.
+    """
+    text = _with_objects(text, prims) if prims else text
     for said, shown in WORDS:
         text = text.replace(said, shown)
     text = _REFERENCE.sub("begin the frame range there", _MEANING.sub("", _CUTS.sub("", text)))
     return _JOINT.sub(r"bone '\1'", _RATE.sub("train again", text))
 
 
-def with_objects(text: str, prims: dict[str, str]) -> str:
-    """A line that names prims, with the objects that they were written from.
-
-    Args:
-        prims: prim path by object name.
-    """
+def _with_objects(text: str, prims: dict[str, str]) -> str:
     names = {prim: name for name, prim in prims.items()}
     paths = "|".join(map(re.escape, names))
-    return re.sub(rf"({paths})(?!\w)", lambda found: names[found[0]], text) if names else text
+    return re.sub(rf"({paths})(?!\w)", lambda found: names[found[0]], text)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dcc_addon.services.panel_errors import WORDS, for_the_panel, with_objects
+from dcc_addon.services.panel_errors import WORDS, for_the_panel
 from neuralocks_core.models.model_file import REMEDIES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,11 +35,11 @@ def _texts(path: Path):
 def test_prims_become_objects():
     """Each prim becomes its own object, even if its path begins like another one's."""
     prims = {"前髪": "/Character/Hair___", "Hair.L": "/Character/Hair_L", "Hair L": "/Character/Hair_L_2"}
-    said = with_objects(
+    said = for_the_panel(
         "/Character/Hair_L_2: as /Character/Hair_L, not /Character/Hair___ or /Character/Hair_Lo", prims
     )
     assert said == "Hair L: as Hair.L, not 前髪 or /Character/Hair_Lo"
-    assert with_objects("/Character: as it is", {}) == "/Character: as it is"
+    assert for_the_panel("/Character: as it is", {}) == "/Character: as it is"
 
 
 @pytest.mark.parametrize(
