@@ -37,7 +37,7 @@ class LiveHair:
     """
 
     def __init__(self, groom: Groom, character: Character, model: StrandModel, say=lambda done: None):
-        self.groom, self.character, self.model = groom, character, model
+        self.character, self.model = character, model
         self.another_body, self.off_skin = "", _off_skin(groom, character)
         self._strands = strands_on(character, groom)
         say(0.4)

@@ -59,7 +59,6 @@ class PoseReader:
     """
 
     def __init__(self, armature, bones: tuple[str, ...]):
-        self.name = armature.name_full
         self.bones = tuple(armature.pose.bones.keys())
         pose = {name: i for i, name in enumerate(self.bones)}
         self._order = np.array([pose[name] for name in bones], int)
