@@ -87,18 +87,12 @@ class SampledRig:
             return self.character
         return self.carried.setdefault(joint, replace(self.character, carrier=joint))
 
-    def moving(self, body: bool) -> np.ndarray:
-        """Joints (N,) by which hair is moved; with `body` also those that move the body, which hair is kept out of."""
-        return self._moving_hair_and_body if body else self._moving_hair
-
     @cached_property
-    def _moving_hair(self) -> np.ndarray:
-        return np.unique([*self.character.humanoid.values(), *self.carriers.values()])
-
-    @cached_property
-    def _moving_hair_and_body(self) -> np.ndarray:
-        hair, body = self.moving(False), self.character.body
-        return hair if body is None else np.union1d(hair, body.joint_indices[body.joint_weights > 0])
+    def moving(self) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (N,) by which hair is moved; and these with all that move the body, which hair may be kept out of."""
+        hair = np.unique([*self.character.humanoid.values(), *self.carriers.values()])
+        body = self.character.body
+        return hair, hair if body is None else np.union1d(hair, body.joint_indices[body.joint_weights > 0])
 
 
 @dataclass(eq=False)

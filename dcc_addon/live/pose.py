@@ -41,7 +41,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
         if body and (turned := as_before(armature)):
             hair = (joint for joint, bone in enumerate(sampled.rig.bones) if bone in turned)
             same |= sampled.character.skeleton.below(*hair)
-        if same[sampled.moving(body)].all():
+        if same[sampled.moving[body]].all():
             return sampled.clip.joints[row]
         if moved and graph.mode == "RENDER" and others_called():
             _tell_late(armature.name_full)

@@ -33,7 +33,7 @@ def _as_sampled(context, armature, sampled: SampledRig) -> bool:
     what moves a rig, and no list of it is complete.
     """
     scene, name, frames = context.scene, armature.name_full, sampled.motion.frames
-    read = sampled.moving(any(hair.neuralocks_hair.resolve for hair in hairs_of(armature, scene)))
+    read = sampled.moving[any(hair.neuralocks_hair.resolve for hair in hairs_of(armature, scene))]
     with stepping(scene):
         for row in {0, len(frames) // 2, len(frames) - 1}:
             step(scene, frames[row])
