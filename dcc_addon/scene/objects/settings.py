@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The settings of anything in Blender, whatever they are: of a constraint, a strip, a modifier."""
 
+from functools import cache
+
 import bpy
 
 NOT_SET = {
@@ -15,20 +17,11 @@ NOT_SET = {
     "influence",
 }
 """Settings that only affect how something is shown, and those of strips that Blender itself writes."""
-_written: dict[type, list[str]] = {}
-_naming: dict[type, list[str]] = {}
 
 
 def settings_of(thing) -> list[str]:
     """Names of the settings of a kind of thing."""
-    kind = type(thing)
-    if kind not in _written:
-        _written[kind] = [
-            p.identifier
-            for p in kind.bl_rna.properties
-            if p.identifier not in NOT_SET and not p.is_readonly and p.type != "COLLECTION"
-        ]
-    return _written[kind]
+    return _written(type(thing))
 
 
 def as_set(thing, names) -> list:
@@ -49,8 +42,16 @@ def as_set(thing, names) -> list:
 
 def objects_named(thing) -> list:
     """The objects that are among the settings, such as the armature of a modifier; without those that its node group names."""
-    kind = type(thing)
-    if kind not in _naming:
-        pointers = [p for p in kind.bl_rna.properties if p.type == "POINTER"]
-        _naming[kind] = [p.identifier for p in pointers if p.fixed_type.identifier == "Object"]
-    return [other for name in _naming[kind] if (other := getattr(thing, name)) is not None]
+    return [other for name in _naming(type(thing)) if (other := getattr(thing, name)) is not None]
+
+
+@cache
+def _written(kind: type) -> list[str]:
+    properties = (p for p in kind.bl_rna.properties if not p.is_readonly and p.type != "COLLECTION")
+    return [p.identifier for p in properties if p.identifier not in NOT_SET]
+
+
+@cache
+def _naming(kind: type) -> list[str]:
+    pointers = (p for p in kind.bl_rna.properties if p.type == "POINTER")
+    return [p.identifier for p in pointers if p.fixed_type.identifier == "Object"]
