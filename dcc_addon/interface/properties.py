@@ -35,7 +35,7 @@ def by_script(context) -> bool:
 
 
 def _live_changed(hair_settings, context) -> None:
-    view.strands_toggled(hair_settings.id_data, context, wait=by_script(context))
+    view.strands_toggled(hair_settings.id_data, context.scene, wait=by_script(context))
     background.request()
 
 
@@ -49,7 +49,7 @@ def _look_changed(_settings, context) -> None:
 
 
 def _rig_live_changed(character, context) -> None:
-    view.rig_toggled(character.id_data, context)
+    view.rig_toggled(character.id_data, context.scene)
     background.request()
 
 

@@ -15,22 +15,22 @@ from ..session import session
 from . import live_rig, live_strands
 
 
-def strands_toggled(hair, context, wait: bool) -> None:
+def strands_toggled(hair, scene, wait: bool) -> None:
     """The Live switch of strands was used; `wait` as for `update`."""
     session.forget(hair.name_full)
     if hair.neuralocks_hair.live:
         lock()
-        refresh(context.scene, wait)
+        refresh(scene, wait)
     else:
         live_strands.rest(hair)
 
 
-def rig_toggled(armature, context) -> None:
+def rig_toggled(armature, scene) -> None:
     """The Live switch of the hair bones was used."""
     session.messages.pop(armature.name_full, None)
     if armature.neuralocks_character.rig_live:
         lock()
-        refresh(context.scene)
+        refresh(scene)
     else:
         live_rig.rest(armature)
 
