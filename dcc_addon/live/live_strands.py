@@ -22,6 +22,7 @@ from ..scene.drawing.windows import drawing, layer_shown
 from ..scene.files.paths import check_found
 from ..scene.hair import curves
 from ..scene.hair.muting import mute_deformers, unmute_deformers
+from ..scene.objects.lively import lively
 from ..scene.objects.lookup import find, identity, in_scene
 from ..services import rig as rig_service
 from ..services.axes import to_core
@@ -181,7 +182,7 @@ def _let_go(of: tuple) -> None:
 
 def _moved() -> set:
     """Curves of all live hair objects of the file."""
-    return {thing.data for thing in bpy.data.objects if thing.type == "CURVES" and thing.neuralocks_hair.live}
+    return {hair.data for hair in lively(bpy.data.objects).hairs}
 
 
 def _recipe(hair, sampled, wanted: tuple):

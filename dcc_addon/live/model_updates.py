@@ -10,6 +10,7 @@ import bpy
 
 from neuralocks_core.models import model_file
 
+from ..scene.objects.lively import lively
 from ..session import session
 
 NOTE = (
@@ -33,8 +34,7 @@ def compare() -> None:
 
 def _shipped_hair() -> list:
     """Live hair that names no model."""
-    hairs = (thing for thing in bpy.data.objects if thing.type == "CURVES")
-    return [h for h in hairs if h.neuralocks_hair.live and not h.neuralocks_hair.model.strip()]
+    return [hair for hair in lively(bpy.data.objects).hairs if not hair.neuralocks_hair.model.strip()]
 
 
 @cache
