@@ -78,12 +78,8 @@ def reached(things) -> list:
 
 def hangs(thing) -> list:
     """How an object hangs on its parent, whichever that is."""
-    return [
-        thing.parent is None,
-        thing.parent_type,
-        thing.parent_bone,
-        *(row[:] for row in thing.matrix_parent_inverse),
-    ]
+    inverse = (row[:] for row in thing.matrix_parent_inverse)
+    return [thing.parent is None, thing.parent_type, thing.parent_bone, *inverse]
 
 
 def stands(thing, moving: set[str]) -> list:
@@ -106,10 +102,8 @@ def _animation(thing) -> list:
 
 
 def _object(thing) -> list:
-    moving, found = (
-        animated(thing.animation_data),
-        [thing.name_full, thing.parent and thing.parent.name_full, *hangs(thing)],
-    )
+    moving = animated(thing.animation_data)
+    found = [thing.name_full, thing.parent and thing.parent.name_full, *hangs(thing)]
     found += [_constraint(c, f'constraints["{_quoted(c)}"].', moving) for c in thing.constraints]
     found += [_numbers(thing, "", moving), *(_animated_by(data) for data in _animation(thing))]
     if thing.pose is not None:
@@ -117,24 +111,16 @@ def _object(thing) -> list:
         found.append(thing.pose.ik_solver)
         for bone in thing.pose.bones:
             start = f'pose.bones["{_quoted(bone)}"]'
-            found += [
-                bone.name,
-                bone.bone.inherit_scale,
-                bone.parent and bone.parent.name,
-                _numbers(bone, start, moving),
-            ]
+            found += [bone.name, bone.bone.inherit_scale, bone.parent and bone.parent.name]
+            found.append(_numbers(bone, start, moving))
             found += [_constraint(c, f'{start}.constraints["{_quoted(c)}"].', moving) for c in bone.constraints]
     return found
 
 
 def _held(thing) -> list:
     moving, live = animated(thing.animation_data, HAIR), as_before(thing)
-    found = [
-        *stands(thing, moving),
-        _mode(thing, "", moving),
-        _lists(thing, "", moving),
-        *(_read(data) for data in _animation(thing)),
-    ]
+    found = [*stands(thing, moving), _mode(thing, "", moving), _lists(thing, "", moving)]
+    found += [_read(data) for data in _animation(thing)]
     if thing.pose is not None:
         bones = thing.pose.bones
         found.append(thing.data.pose_position)
