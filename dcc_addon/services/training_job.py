@@ -10,6 +10,7 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
+import neuralocks_core
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.time_left import TimeLeft
 from neuralocks_core.training.work import abandon
@@ -77,8 +78,6 @@ def environment() -> dict[str, str]:
     """This process's environment without what belongs to Blender's own Python; the packages beside the add-on can be found. Numpy
     does not split small matrices among threads, which would wait for each other beside Blender's.
     """
-    import neuralocks_core
-
     kept = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")} | {"PYTHONUTF8": "1"}
     kept.setdefault("OPENBLAS_NUM_THREADS", "1")
     root = Path(neuralocks_core.__file__).resolve().parent.parent
@@ -205,10 +204,6 @@ class TrainingJob:
 def default_python() -> str:
     """An interpreter that may have torch: that of an activated or nearby environment."""
     name = "Scripts/python.exe" if sys.platform == "win32" else "bin/python"
-    import neuralocks_core
-
-    candidates = [
-        os.environ.get("VIRTUAL_ENV", ""),
-        str(Path(neuralocks_core.__file__).resolve().parent.parent / ".venv"),
-    ]
-    return next((str(Path(c) / name) for c in candidates if c and (Path(c) / name).is_file()), "")
+    folders = [os.environ.get("VIRTUAL_ENV"), Path(neuralocks_core.__file__).resolve().parent.parent / ".venv"]
+    found = (Path(folder) / name for folder in folders if folder)
+    return next((str(path) for path in found if path.is_file()), "")
