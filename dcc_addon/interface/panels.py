@@ -9,6 +9,8 @@ from neuralocks_core.motion import LOOP_GAP
 
 from ..operators.training import job, known_problem, notes
 from ..scene.baked import as_keyed, attach
+from ..scene.character.armature import found_by, read
+from ..scene.character.body import left_behind
 from ..scene.files.paths import usual_output
 from ..scene.hair import imported
 from ..scene.keys import hair_keys
@@ -16,6 +18,7 @@ from ..scene.motion.sampled_from import begins_later, frames_of
 from ..scene.particles import waiting
 from ..services.panel_errors import for_the_panel
 from ..services.remaining import in_words
+from ..services.rig import advice
 from ..services.sliders import SLIDERS
 from ..session import session
 from .hair_notes import hair_notes, unnamed_model
@@ -274,25 +277,19 @@ def findings(armature) -> tuple[list[str], str]:
     """What is found in the rig, and what is wrong with it or with the chosen body; the rig is examined again only when it may
     be found otherwise.
     """
-    from ..scene.character import armature as armature_reader
-    from ..scene.character.body import left_behind
-    from ..services import rig as rig_service
-
-    chosen = armature.neuralocks_character.head_bone
-    key = armature.name_full, *armature_reader.found_by(armature)
+    own = armature.neuralocks_character
+    key = armature.name_full, *found_by(armature)
     if key not in _findings:
         _findings.clear()
         try:
-            rig = armature_reader.read(armature, chosen)
-            humanoid = rig.humanoid
-            head = humanoid["head"]
-            reason = humanoid.reasons["head"]
+            rig = read(armature, own.head_bone)
+            head, reason = rig.humanoid["head"], rig.humanoid.reasons["head"]
             why = "" if reason.startswith(("by name", "given")) else f" ({reason})"
-            _findings[key] = [f"Head: {rig.bones[head]}{why}", *rig_service.advice(rig)], ""
+            _findings[key] = [f"Head: {rig.bones[head]}{why}", *advice(rig)], ""
         except NeuralocksError as error:
             _findings[key] = [], str(error)
-    (lines, problem), body = _findings[key], armature.neuralocks_character.body
-    return lines, problem or (left_behind(body, armature) if body is not None else "")
+    lines, problem = _findings[key]
+    return lines, problem or (left_behind(own.body, armature) if own.body is not None else "")
 
 
 CLASSES = (NEURALOCKS_PT_character, NEURALOCKS_PT_wind, NEURALOCKS_PT_strands, NEURALOCKS_PT_rig, NEURALOCKS_PT_bake)
