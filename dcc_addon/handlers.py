@@ -9,7 +9,6 @@ from neuralocks_core.errors import NeuralocksError
 from . import background
 from .live import model_updates, view
 from .live.live_strands import show_all_rest, show_rest_left
-from .live.models import SETTING
 from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
 from .scene.baked import as_groomed
 from .scene.baked.attach import switch_changed
@@ -89,7 +88,7 @@ def on_load(*_):
         session.opened = {scene.name_full: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
     model_updates.compare()
     make_comparable(bpy.data.objects)
-    named_from.remember(bpy.data.objects, SETTING.values())
+    named_from.remember(bpy.data.objects)
     own = lively(bpy.data.objects)
     if own.hairs or own.armatures:
         lock()
@@ -102,7 +101,7 @@ def on_load(*_):
 def on_undo(scene, *_):
     """Undo may have brought back another pose, groom or choice."""
     session.doubt()
-    named_from.remember(bpy.data.objects, SETTING.values())
+    named_from.remember(bpy.data.objects)
     view.forget_gone()
     view.forget_ended()
     background.request()  # a half-done sampling refers to a scene that no longer exists
@@ -122,8 +121,8 @@ def before_save(target=None, *_):
     for scene in bpy.data.scenes:
         view.show_rest(scene)
     show_all_rest()
-    session.remade = _unseen(lambda: Remade(target or bpy.data.filepath, SETTING.values()))
-    named_from.forget(SETTING.values())
+    session.remade = _unseen(lambda: Remade(target or bpy.data.filepath))
+    named_from.forget()
 
 
 @persistent
@@ -131,7 +130,7 @@ def after_save(*_):
     """Continue as before the save, in all scenes; last in the one shown, because hair may be in several."""
     if session.remade is not None:
         _unseen(session.remade.put_back)
-    named_from.remember(bpy.data.objects, SETTING.values())
+    named_from.remember(bpy.data.objects)
     for scene in sorted(bpy.data.scenes, key=lambda scene: scene == bpy.context.scene):
         view.refresh(scene)
     blurred, session.blurred = session.blurred, []
@@ -142,7 +141,7 @@ def after_save(*_):
 @persistent
 def after_import(context, *_):
     """Let appended objects find their models."""
-    _unseen(lambda: remake(context.import_items, SETTING.values()))
+    _unseen(lambda: remake(context.import_items))
 
 
 @persistent

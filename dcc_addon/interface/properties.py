@@ -10,7 +10,6 @@ from neuralocks_core.wind import STRONGEST
 
 from .. import background
 from ..live import view
-from ..live.models import SETTING as MODELS
 from ..scene.files import named_from
 from ..scene.files.paths import FILE
 from ..services.sliders import SLIDERS
@@ -58,13 +57,13 @@ def _rig_look_changed(_character, context) -> None:
 
 
 def _rig_model_changed(character, context) -> None:
-    named_from.remember([character.id_data], MODELS.values())
+    named_from.remember([character.id_data])
     session.chains.pop(character.id_data.name_full, None)
     view.refresh(context.scene)
 
 
 def _model_changed(settings, context) -> None:
-    named_from.remember([settings.id_data], MODELS.values())
+    named_from.remember([settings.id_data])
     session.forget(settings.id_data.name_full)
     _look_changed(settings, context)
 

@@ -9,11 +9,8 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models import model_file
 from neuralocks_core.models.runtime import StrandModel
 
-from ..scene.files.paths import absolute, library_of
+from ..scene.files.paths import MODELS, absolute, library_of
 from ..session import session
-
-SETTING = {"strands": "neuralocks_hair.model", "rig": "neuralocks_character.rig_model"}
-"""Where an object names its model, by its kind."""
 
 
 def load_model(found: str) -> StrandModel:
@@ -44,10 +41,10 @@ def named_model(thing, kind: str = "strands") -> str | None:
     Raises:
         NeuralocksError: it is named relative to a file, and is not there.
     """
-    path = thing.path_resolve(SETTING[kind])
+    path = thing.path_resolve(MODELS[kind])
     if not path.strip():
         return None
-    library = library_of(thing, SETTING[kind])
+    library = library_of(thing, MODELS[kind])
     found = absolute(path, library)
     if path.startswith("//") and not os.path.exists(found):
         raise NeuralocksError(

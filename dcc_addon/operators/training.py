@@ -13,11 +13,10 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models.model_file import SUFFIX
 from neuralocks_core.training.work import abandon, reserve
 
-from ..live.models import SETTING
 from ..live.view import refresh
 from ..scene.drawing.redraw import redraw
 from ..scene.export import write_shot
-from ..scene.files.paths import check_own, library_of
+from ..scene.files.paths import MODELS, check_own, library_of
 from ..scene.files.save_as import named_here, set_path
 from ..scene.hair import curves
 from ..scene.objects.lookup import find, identified, identity, named
@@ -215,7 +214,7 @@ def finish() -> str | None:
     elif target is None:
         message = f"{name}: trained, but it is no longer in this file; choose its model by hand: {running.out}"
     else:
-        setting = SETTING[wanted.kind]
+        setting = MODELS[wanted.kind]
         set_path(target, setting, named_here(running.out))
         if library_of(target, setting) is not None:  # for an override, the same path is relative to its own file
             set_path(target, setting, running.out)

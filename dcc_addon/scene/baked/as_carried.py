@@ -6,7 +6,7 @@ from neuralocks_core.errors import NeuralocksError
 from ...services.wind import Blowing
 from ...session import session
 from ..character.armature import found_by, read
-from ..files.paths import full, library_of
+from ..files.paths import MODELS, full, library_of
 from ..objects.recorded import number_of
 from .as_baked import print_of
 
@@ -26,12 +26,12 @@ def others(armature, scene) -> dict[str, int]:
     }
 
 
-def model(thing, setting: str) -> int | None:
-    """A number of the model that a setting of hair, or of an armature with hair bones, names, told by what is in its file: a save in
+def model(thing, kind: str) -> int | None:
+    """A number of the model, of a kind of MODELS, that hair, or an armature with hair bones, names, told by what is in its file: a save in
     another folder names it otherwise. None if that cannot be read here.
     """
-    path = thing.path_resolve(setting).strip()
-    held = print_of(full(path, library_of(thing, setting)))
+    path = thing.path_resolve(MODELS[kind]).strip()
+    held = print_of(full(path, library_of(thing, MODELS[kind])))
     return None if path and not held else number_of([bool(path), held])
 
 

@@ -74,7 +74,7 @@ def _sliders(hair, older: bool = False) -> int:
 
 
 def _model(hair) -> int | None:
-    return as_carried.model(hair, "neuralocks_hair.model")
+    return as_carried.model(hair, "strands")
 
 
 def _number_of(data) -> int:

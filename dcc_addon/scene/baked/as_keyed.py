@@ -38,7 +38,7 @@ def _numbers(armature, scene) -> dict[str, int]:
     own = armature.neuralocks_character
     return {
         "Motion": recorded.number_of(round(own.rig_motion, 6)),
-        "Model": as_carried.model(armature, "neuralocks_character.rig_model"),
+        "Model": as_carried.model(armature, "rig"),
         "Chains": recorded.number_of(own.chains),
         "wind": as_carried.wind(armature),
         **as_carried.others(armature, scene),

@@ -8,17 +8,13 @@ import os
 import bpy
 
 from . import named_from
-from .paths import full, library_of
+from .paths import full, models_from_here
 from .save_as import relative, set_path
 
 
-def remake(items, settings) -> None:
-    """Rewrite settings of appended objects that name a file relative to their source file, or to the one that they were copied in, so
-    that they name the same file from here.
-
-    Args:
-        items: what Blender reports about an import, since 4.3.
-        settings: paths of the settings, from the object.
+def remake(items) -> None:
+    """Rewrite settings of appended objects that name a model relative to their source file, or to the one that they were copied in, so
+    that they name the same file from here; `items` are what Blender reports about an import, since 4.3.
     """
     here = os.path.dirname(bpy.data.filepath)
     for item in items:
@@ -27,9 +23,7 @@ def remake(items, settings) -> None:
             continue
         if not isinstance(thing, bpy.types.Object) or thing.library is not None:
             continue
-        for setting, folder in named_from.folders(thing, settings).items():
-            path = thing.path_resolve(setting)
-            if path.startswith("//") and library_of(thing, setting) is None:
-                whole = os.path.normpath(full(path, library, folder or None))
-                set_path(thing, setting, relative(whole, here) if here else whole)
-        named_from.remember([thing], settings)
+        for setting, path in models_from_here(thing).items():
+            whole = os.path.normpath(full(path, library, named_from.folder(thing, setting)))
+            set_path(thing, setting, relative(whole, here) if here else whole)
+        named_from.remember([thing])

@@ -7,32 +7,32 @@ import os
 
 import bpy
 
-from .paths import library_of
+from .paths import MODELS, models_from_here
 
 KINDS = "CURVES", "ARMATURE"
 """Types of the objects that name models. Reading the settings of others would give them some."""
 
 
-def remember(things, settings) -> None:
-    """Note this file's folder with objects whose settings, given by their paths from the object, are named from it."""
+def remember(things) -> None:
+    """Note this file's folder with objects that name models from it."""
     here = os.path.dirname(bpy.data.filepath)
     for thing in _own(things):
-        for setting in settings:
-            from_here = thing.path_resolve(setting).startswith("//") and library_of(thing, setting) is None
-            _set(thing, setting, here if from_here else "")
+        from_here = models_from_here(thing)
+        for setting in MODELS.values():
+            _set(thing, setting, here if setting in from_here else "")
 
 
-def forget(settings) -> None:
+def forget() -> None:
     """The file is about to be saved."""
     for thing in _own(bpy.data.objects):
-        for setting in settings:
+        for setting in MODELS.values():
             _set(thing, setting, "")
 
 
-def folders(thing, settings) -> dict[str, str]:
-    """The folder from which each setting is named; empty if that is unknown, or is not there any more."""
-    found = {setting: _group(thing, setting).named_from for setting in settings}
-    return {setting: folder if os.path.isdir(folder) else "" for setting, folder in found.items()}
+def folder(thing, setting: str) -> str | None:
+    """The folder from which a setting is named; None if that is unknown, or is not there any more."""
+    found = _group(thing, setting).named_from
+    return found if os.path.isdir(found) else None
 
 
 def _own(things) -> list:

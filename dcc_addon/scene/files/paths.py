@@ -11,6 +11,8 @@ from neuralocks_core.errors import NeuralocksError
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set()
 FILE = {"subtype": "FILE_PATH", "options": _RELATIVE}
 """Arguments for such a property; since 4.5, Blender warns about // unless the property says that it supports it."""
+MODELS = {"strands": "neuralocks_hair.model", "rig": "neuralocks_character.rig_model"}
+"""The setting in which an object names its model, as a path from the object, by the model's kind."""
 
 
 def absolute(path: str, library=None) -> str:
@@ -59,6 +61,12 @@ def library_of(thing, setting: str):
             break
         thing = override.reference
     return thing.library
+
+
+def models_from_here(thing) -> dict[str, str]:
+    """Paths by which an object names models relative to this file, by setting."""
+    named = ((setting, thing.path_resolve(setting)) for setting in MODELS.values())
+    return {each: path for each, path in named if path.startswith("//") and library_of(thing, each) is None}
 
 
 def check_found(thing) -> None:

@@ -7,23 +7,21 @@ import os
 
 import bpy
 
-from .paths import full, library_of
+from .paths import full, models_from_here
 
 
 class Remade:
-    """Settings of this file that name a file relative to it, rewritten for another folder."""
+    """Settings of this file that name a model relative to it, rewritten for another folder."""
 
-    def __init__(self, target: str, settings):
+    def __init__(self, target: str):
         self._source, folder = bpy.data.filepath, os.path.dirname(target)
         self._kept = []
         if not self._source or folder == os.path.dirname(self._source):
             return
         for thing in (o for o in bpy.data.objects if o.library is None):
-            for setting in settings:
-                path = thing.path_resolve(setting)
-                if path.startswith("//") and library_of(thing, setting) is None:
-                    self._kept.append((thing.name, setting, path))
-                    set_path(thing, setting, relative(full(path), folder))
+            for setting, path in models_from_here(thing).items():
+                self._kept.append((thing.name, setting, path))
+                set_path(thing, setting, relative(full(path), folder))
 
     def put_back(self) -> None:
         """Undo that if the file's own path has not changed: after a copy was saved, or nothing was."""
