@@ -43,7 +43,7 @@ def is_off(data) -> bool:
 def to_switch() -> list[tuple]:
     """All Curves whose cache should be switched off, or, after an undo, on again, with whether on; that counts as done."""
     own = (data for data in bpy.data.hair_curves if data.library is None)
-    found = [(data, not changed(data)) for data in own if changed(data) != is_off(data)]
+    found = [(data, is_off(data)) for data in own if changed(data) != is_off(data)]
     for data, on in found:
         if on:
             data.pop(OFF)
