@@ -7,6 +7,7 @@ Blender objects are looked up by name each time: a pointer kept over an undo or 
 from __future__ import annotations
 
 import traceback
+from collections import deque
 from collections.abc import Callable, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -103,8 +104,8 @@ class Session:
     hairs: dict[str, Prepared] = field(default_factory=dict)
     written: dict[str, Written] = field(default_factory=dict)
     """What the live view wrote to each hair object last; see `edited`."""
-    followed: list[Followed] = field(default_factory=list)
-    """What was done to the points of live hair; see `edited`."""
+    followed: deque[Followed] = field(default_factory=lambda: deque(maxlen=8))
+    """What was done to the points of live hair last; see `edited`."""
     stood: dict[object, Stood] = field(default_factory=dict)
     """How live hair objects stood when last written, by identity, also those that are gone; see `joined`."""
     preparing: dict[str, tuple[Threaded, Callable[[str], None]]] = field(default_factory=dict)

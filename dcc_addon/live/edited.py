@@ -19,8 +19,6 @@ from ..session import session
 
 ROUNDING = 1e-5
 """Points that differ by less than this, relative to the largest coordinate, are the same."""
-KEPT = 7
-"""How many earlier changes are recognised again."""
 
 
 def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None:
@@ -102,7 +100,7 @@ def follow(hair, sampled, world: np.ndarray) -> None:
             break
     else:
         change = [*_applied(hair, before), "its points were changed"][0]
-    session.followed[:] = [*session.followed[-KEPT:], Followed(identity(data), _checksum(data), now, change)]
+    session.followed.append(Followed(identity(data), _checksum(data), now, change))
     if isinstance(change, str):
         _refuse(hair, change)
     curves.move_rest(data, change)
