@@ -77,7 +77,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         settings = armature.neuralocks_character
         turns = bones.turns(frames / sampled.motion.rate, settings.rig_motion, wind=in_core(armature))
         every = sampled.motion.frames
-        own = own_turns(sampled.own, sampled.motion, bones.joints, every)
+        own = own_turns(sampled.own, sampled.motion, bones.chains.joints, every)
         # Blender evaluates animation at stretched time.
         stretch = 1 / stretch_of(scene)
         settings.rig_live = False

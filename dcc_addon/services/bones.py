@@ -56,14 +56,13 @@ class LiveBones:
     Attributes:
         model: the rig model.
         bones: names of the hair bones, (N), as in Blender.
-        joints: their indices in the skeleton, (N,).
-        chains: this rig's, with every joint of the model's chains.
+        chains: this rig's, with every joint of the model's chains; their joints (N,) are the hair bones.
     """
 
     model: RigModel
     bones: tuple[str, ...]
-    joints: np.ndarray
     chains: HairChains
+    _clip: Clip | None = None
 
     @classmethod
     def of(cls, model: RigModel, rig: RigArrays, character: Character) -> "LiveBones":
@@ -74,12 +73,12 @@ class LiveBones:
             model.chains.check_same(chains)
         except NeuralocksError as error:
             raise reworded(error, rig.said(str(error))) from None
-        return cls(model, tuple(rig.bones[j] for j in chains.joints), chains.joints, chains)
+        return cls(model, tuple(rig.bones[j] for j in chains.joints), chains)
 
     def follow(self, character: Character, clip: Clip) -> None:
         """Read the body's history from this clip from now on."""
-        if getattr(self, "_clip", None) is not clip:
-            self._clip, self._carried = clip, CarriedHair(self.model, self.joints, character, clip)
+        if self._clip is not clip:
+            self._clip, self._carried = clip, CarriedHair(self.model, self.chains.joints, character, clip)
 
     def turns(
         self, times, strength: float = 1.0, joints: np.ndarray | None = None, wind: Wind | None = None
