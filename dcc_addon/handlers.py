@@ -16,7 +16,7 @@ from .scene.character.layers import working_in
 from .scene.drawing.last_called import go_last, others_called
 from .scene.drawing.locked import lock
 from .scene.drawing.together import drawn_with
-from .scene.drawing.windows import layer_shown
+from .scene.drawing.windows import in_view_last, layer_shown
 from .scene.files import named_from
 from .scene.files.appended import remake
 from .scene.files.overrides import make_comparable
@@ -127,11 +127,11 @@ def before_save(target=None, *_):
 
 @persistent
 def after_save(*_):
-    """Continue as before the save, in all scenes; last in the one shown, because hair may be in several."""
+    """Continue as before the save, in all scenes."""
     if session.remade is not None:
         _unseen(session.remade.put_back)
     named_from.remember(bpy.data.objects)
-    for scene in sorted(bpy.data.scenes, key=lambda scene: scene == bpy.context.scene):
+    for scene in in_view_last(bpy.data.scenes):
         view.refresh(scene)
     blurred, session.blurred = session.blurred, []
     for hair in filter(None, map(find, blurred)):

@@ -18,7 +18,7 @@ from ..scene.character.placing import world
 from ..scene.character.riding import on_hair_bone
 from ..scene.drawing.clock import shown_frame
 from ..scene.drawing.watched import evaluated_for_itself
-from ..scene.drawing.windows import drawing, layer_shown
+from ..scene.drawing.windows import drawing, in_view_last, layer_shown
 from ..scene.files.paths import check_found
 from ..scene.hair import curves
 from ..scene.hair.muting import mute_deformers, unmute_deformers
@@ -209,14 +209,14 @@ def _recipe(hair, sampled, wanted: tuple):
 
 
 def _arrived(name: str) -> None:
-    """Show hair that has just been prepared, in all scenes that it is in and that have been shown; last in the one in view."""
+    """Show hair that has just been prepared, in all scenes that it is in and that have been shown."""
     hair = find(name)
     if hair is None or not hair.neuralocks_hair.live or session.paused:
         return
     armature = hair.neuralocks_hair.armature
     shown = [scene for scene in hair.users_scene if any(layer.depsgraph for layer in scene.view_layers)]
     drawn = {each: home for home in shown for each in drawing(home) if each not in shown}  # where the hair is a guest
-    for scene in sorted([*shown, *drawn], key=lambda scene: scene == bpy.context.scene):
+    for scene in in_view_last([*shown, *drawn]):
         layer = layer_of(armature, scene) if armature is not None else None
         update(hair, scene, graph_of(scene, layer or layer_shown(scene)), False, False, drawn.get(scene))
 

@@ -15,8 +15,12 @@ def scenes_shown() -> list:
 
 def drawing(scene) -> list:
     """The scene, and shown scenes that draw one of its characters; last the one in view."""
-    found = {scene, *(shown for shown in scenes_shown() if scene in homes(shown))}
-    return sorted(found, key=lambda each: each == bpy.context.scene)
+    return in_view_last({scene, *(shown for shown in scenes_shown() if scene in homes(shown))})
+
+
+def in_view_last(scenes) -> list:
+    """Scenes in an order in which hair that is in several of them ends as the scene in view shows it."""
+    return sorted(scenes, key=lambda scene: scene == bpy.context.scene)
 
 
 def layer_shown(scene):
