@@ -141,4 +141,4 @@ def _follow_again(hair) -> bool:
 
 
 def _checksum(data) -> int:
-    return zlib.crc32(np.ascontiguousarray(curves.points(data)))
+    return zlib.crc32(curves.points(data))

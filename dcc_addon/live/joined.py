@@ -59,4 +59,4 @@ def _parts(data, stood: Stood) -> list[slice]:
         return []
     starts = np.flatnonzero((rest == stood.root).all(axis=1))
     parts = [slice(start, start + count) for start in starts.tolist() if start + count <= len(rest)]
-    return [part for part in parts if zlib.crc32(np.ascontiguousarray(rest[part])) == stood.rest]
+    return [part for part in parts if zlib.crc32(rest[part]) == stood.rest]
