@@ -157,17 +157,11 @@ def _follow_time(cache, scene) -> None:
     """Play the baked frames even if time is stretched: everything animated, including caches, is then at another frame than the one
     shown.
     """
-    cache.driver_remove("frame")
-    expression = _in_step(scene)
-    cache.override_frame = bool(expression)
-    if expression:
-        cache.driver_add("frame").driver.expression = expression
-
-
-def _in_step(scene) -> str:
-    """The frame of a bake of this scene at the frame of its animation, as a driver expression; empty if they are the same."""
     stretch = Fraction(scene.render.frame_map_new, scene.render.frame_map_old)
-    return "" if stretch == 1 else f"frame * {stretch.numerator} / {stretch.denominator}"
+    cache.driver_remove("frame")
+    cache.override_frame = stretch != 1
+    if stretch != 1:
+        cache.driver_add("frame").driver.expression = f"frame * {stretch.numerator} / {stretch.denominator}"
 
 
 def _cache_file(path: str):

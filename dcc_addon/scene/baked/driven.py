@@ -27,12 +27,8 @@ def number_of_drivers(mesh) -> int:
 def _driver(curve, paths: list[str]) -> list:
     driver = curve.driver
     driven = paths.index(curve.data_path) if curve.data_path in paths else -1
-    of_curve = shape_of(curve)
-    return [driven, driver.type, driver.expression, driver.use_self, of_curve, *map(_variable, driver.variables)]
-
-
-def _variable(variable) -> list:
-    return [variable.name, variable.type, *map(_target, variable.targets)]
+    read = ([each.name, each.type, *map(_target, each.targets)] for each in driver.variables)
+    return [driven, driver.type, driver.expression, driver.use_self, shape_of(curve), *read]
 
 
 def _target(target) -> list:

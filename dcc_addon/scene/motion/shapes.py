@@ -49,12 +49,9 @@ def _curve(curve) -> list:
         for spline in curve.splines:
             found += as_set(spline, settings_of(spline))
             for point in (*spline.points, *spline.bezier_points):
-                found.append([tuple(value) if hasattr(value, "__len__") else value for value in _of(point)])
+                values = (getattr(point, name) for name in POINT if hasattr(point, name))
+                found.append([tuple(value) if hasattr(value, "__len__") else value for value in values])
     return found
-
-
-def _of(point) -> list:
-    return [getattr(point, name) for name in POINT if hasattr(point, name)]
 
 
 def _keys(keys) -> list:
