@@ -89,21 +89,21 @@ class _Recording:
         humanoid = self._rig.humanoid
         self._head = humanoid["head"]
         self._needed = {above for joint in humanoid.values() for above in ancestors(joint, self._rig.parents)}
-        bodies = bodies_of(armature, self._scene)
+        bodies = bodies_of(armature, scene)
         self._bodies = [body.name_full for body in bodies]
-        self._rigid = [part.name_full for part in rigid_parts.find(armature, bodies, self._scene)]
-        self._tracked = [*(hair.name_full for hair in hairs_of(armature, self._scene)), *self._bodies]
+        self._rigid = [part.name_full for part in rigid_parts.find(armature, bodies, scene)]
+        self._tracked = [*(hair.name_full for hair in hairs_of(armature, scene)), *self._bodies]
         self._depends = {
-            "key": key_of(armature, self._scene),
-            "rigging": rigging_of(armature, self._scene),
-            "posture": posture_of(armature, self._scene),
+            "key": key_of(armature, scene),
+            "rigging": rigging_of(armature, scene),
+            "posture": posture_of(armature, scene),
             "unreported": {body.name_full: unreported(body) for body in bodies},
-            "moved_by": moved_by(armature, self._scene),
+            "moved_by": moved_by(armature, scene),
         }
         self._edits = session.edits
-        self.frames = frame_numbers(*frames_of(self._scene), self._scene.neuralocks.subframes)
-        self._rate = rate_of(self._scene)
-        self._unit = self._scene.unit_settings.scale_length
+        self.frames = frame_numbers(*frames_of(scene), scene.neuralocks.subframes)
+        self._rate = rate_of(scene)
+        self._unit = scene.unit_settings.scale_length
         count, bones = len(self.frames), len(self._rig.bones)
         self._block = min(BLOCK, max(1, MANY // bones))
         self._pose, self._basis = np.empty((2, self._block, len(armature.pose.bones), 4, 4), np.float32)
