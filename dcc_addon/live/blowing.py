@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The wind that blows on a character's hair, strands and bones alike, read from its settings."""
 
-from neuralocks_core.wind import Wind
-
 from ..services.wind import Blowing
 
 
@@ -10,8 +8,3 @@ def blowing(armature) -> Blowing:
     """The wind as a bake takes it."""
     own = armature.neuralocks_character
     return Blowing.of(own.wind, own.wind_direction, own.gusts)
-
-
-def in_core(armature) -> Wind | None:
-    """The same in the core's axes; None for a calm."""
-    return blowing(armature).in_core()

@@ -9,7 +9,7 @@ from ..scene.drawing.clock import shown_frame
 from ..scene.keys import rotations
 from ..services.bones import LiveBones
 from ..session import session
-from .blowing import in_core
+from .blowing import blowing
 from .models import model_path, stamp
 from .pose import pose
 from .unsampled import unsampled
@@ -34,7 +34,7 @@ def _update(armature, scene, graph, moved) -> None:
         show_rest(armature)
     joints = pose(armature, sampled, scene, graph, moved)
     settings = armature.neuralocks_character
-    time, wind = shown_frame(scene) / sampled.motion.rate, in_core(armature)
+    time, wind = shown_frame(scene) / sampled.motion.rate, blowing(armature).in_core()
     turns = bones.turns([time], settings.rig_motion, joints[None], wind)[0]
     if not settings.rig_kept:
         settings.rig_kept = rotations.kept(armature, bones.bones)

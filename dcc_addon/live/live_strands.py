@@ -31,7 +31,7 @@ from ..services.motion import TOLERANCE
 from ..services.sliders import MATERIAL, MOTION
 from ..session import session
 from . import edited, joined, preparing
-from .blowing import in_core
+from .blowing import blowing
 from .models import load_model, model_path, named_model, stamp
 from .pose import pose
 from .unsampled import unsampled
@@ -70,7 +70,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
         sampled.stale = session.wanting = True
     to_local = inverse(core @ place)
     time = frame / sampled.motion.rate
-    wind = in_core(armature)
+    wind = blowing(armature).in_core()
     wanted = time, joints, to_local, material(settings), typed(settings, MOTION.name), wind, settings.resolve
     prepared = prepare(hair, sampled, wanted, wait)
     if prepared is None:

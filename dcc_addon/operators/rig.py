@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
 from ..bake_files import output_path, owner_of, shot_beside
-from ..live.blowing import blowing, in_core
+from ..live.blowing import blowing
 from ..live.live_rig import bind, rest, show_rest
 from ..live.models import model_path
 from ..live.view import refresh
@@ -75,7 +75,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
             refresh(scene)
         frames = frame_numbers(first, last, scene.neuralocks.subframes)
         settings = armature.neuralocks_character
-        turns = bones.turns(frames / sampled.motion.rate, settings.rig_motion, wind=in_core(armature))
+        turns = bones.turns(frames / sampled.motion.rate, settings.rig_motion, wind=blowing(armature).in_core())
         every = sampled.motion.frames
         own = own_turns(sampled.own, sampled.motion, bones.chains.joints, every)
         # Blender evaluates animation at stretched time.
