@@ -4,12 +4,11 @@
 import bpy
 
 from neuralocks_core.character import HEAD_WIDTHS
-from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.motion import LOOP_GAP
 
 from ..operators.training import job, known_problem, notes
 from ..scene.baked import as_keyed, attach
-from ..scene.character.armature import found_by, read
+from ..scene.character.armature import examined
 from ..scene.character.body import left_behind
 from ..scene.files.paths import usual_output
 from ..scene.hair import imported
@@ -28,7 +27,6 @@ LATER = (
     "it knows no motion before it. To render a part of a shot again, turn off Scene Range in the panel Bake, and name the "
     "whole shot there"
 )
-_findings: dict[tuple, tuple[list, str]] = {}
 
 
 class _Panel:
@@ -274,22 +272,15 @@ class NEURALOCKS_PT_bake(_Panel, bpy.types.Panel):
 
 
 def findings(armature) -> tuple[list[str], str]:
-    """What is found in the rig, and what is wrong with it or with the chosen body; the rig is examined again only when it may
-    be found otherwise.
-    """
-    own = armature.neuralocks_character
-    key = armature.name_full, *found_by(armature)
-    if key not in _findings:
-        _findings.clear()
-        try:
-            rig = read(armature, own.head_bone)
-            head, reason = rig.humanoid["head"], rig.humanoid.reasons["head"]
-            why = "" if reason.startswith(("by name", "given")) else f" ({reason})"
-            _findings[key] = [f"Head: {rig.bones[head]}{why}", *advice(rig)], ""
-        except NeuralocksError as error:
-            _findings[key] = [], str(error)
-    lines, problem = _findings[key]
-    return lines, problem or (left_behind(own.body, armature) if own.body is not None else "")
+    """What is found in the rig, and what is wrong with it or with the chosen body."""
+    (rig, head, problem), body = examined(armature), armature.neuralocks_character.body
+    if not problem and body is not None:
+        problem = left_behind(body, armature)
+    if rig is None:
+        return [], problem
+    reason = rig.humanoid.reasons["head"]
+    why = "" if reason.startswith(("by name", "given")) else f" ({reason})"
+    return [f"Head: {rig.bones[head]}{why}", *advice(rig)], problem
 
 
 CLASSES = (NEURALOCKS_PT_character, NEURALOCKS_PT_wind, NEURALOCKS_PT_strands, NEURALOCKS_PT_rig, NEURALOCKS_PT_bake)

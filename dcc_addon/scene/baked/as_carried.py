@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What moves hair, strands and bones alike: what a character is set to, and a model, as numbers of a record; see `recorded`."""
 
-from neuralocks_core.errors import NeuralocksError
-
 from ...services.wind import Blowing
-from ...session import session
-from ..character.armature import found_by, read
+from ..character.armature import examined
 from ..files.paths import MODELS, full, library_of
 from ..objects.recorded import number_of
 from .as_baked import print_of
@@ -37,15 +34,8 @@ def model(thing, kind: str) -> int | None:
 
 def _head(armature) -> list[float]:
     """Where the bone rests that carries the hair, chosen or found, for a name may be another and the bone the same; empty if there is
-    none. It is looked for when another may be found: that takes longer than a redraw may.
+    none.
     """
-    key, known = found_by(armature), session.heads.get(armature.name_full)
-    if known is None or known[0] != key:
-        try:
-            rig = read(armature, armature.neuralocks_character.head_bone)
-            found = rig.bones[rig.humanoid["head"]]
-        except NeuralocksError:
-            found = ""
-        known = session.heads[armature.name_full] = key, found
-    head = armature.data.bones.get(known[1])
-    return [round(value, 5) for value in head.head_local] if head else []
+    rig, head, _ = examined(armature)
+    bone = armature.data.bones.get(rig.bones[head]) if rig is not None else None
+    return [round(value, 5) for value in bone.head_local] if bone else []

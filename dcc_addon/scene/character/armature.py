@@ -3,8 +3,11 @@
 
 import numpy as np
 
+from neuralocks_core.errors import NeuralocksError
+
 from ...services import names
 from ...services.rig import RigArrays
+from ...session import session
 from ..files.paths import check_found
 from .skinned import bones_with_skin, groups_of_skin
 
@@ -41,10 +44,23 @@ def read(armature, head_bone: str = "") -> RigArrays:
     )
 
 
-def found_by(armature) -> tuple:
-    """What tells in a redraw whether other joints may be found in a rig: the bones, what they are below and whether they deform, the skin,
-    and the choice of the head.
+def examined(armature) -> tuple[RigArrays | None, int | None, str]:
+    """What `read` gives, and the head that is found in it; or None twice, and why. A rig is examined again only if another head may be
+    found in it: that takes longer than a redraw may.
     """
+    key, known = _found_by(armature), session.examined.get(armature.name_full)
+    if known is None or known[0] != key:
+        try:
+            rig = read(armature, armature.neuralocks_character.head_bone)
+            known = key, (rig, rig.humanoid["head"], "")
+        except NeuralocksError as error:
+            known = key, (None, None, str(error))
+        session.examined[armature.name_full] = known
+    return known[1]
+
+
+def _found_by(armature) -> tuple:
+    """The bones, what they are below and whether they deform, the skin, and the choice of the head."""
     bones = armature.data.bones
     above = tuple(bone.parent.name if bone.parent else "" for bone in bones)
     deform = tuple(bone.use_deform for bone in bones)
