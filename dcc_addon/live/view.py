@@ -8,7 +8,7 @@ import bpy
 from ..scene.character.layers import elsewhere, graph_of, layer_of
 from ..scene.drawing.guests import guests
 from ..scene.drawing.locked import lock
-from ..scene.motion.sampled_from import key_of
+from ..scene.motion.up_to_date import current
 from ..scene.objects.lively import lively
 from ..scene.objects.lookup import find, in_scene
 from ..session import session
@@ -141,9 +141,4 @@ def carriers(scene) -> list:
 
 def needs_sampling(scene) -> list:
     """Those of `carriers` whose motion is unknown or out of date."""
-    found = []
-    for armature in carriers(scene):
-        sampled = session.rigs.get(armature.name_full)
-        if sampled is None or sampled.stale or sampled.key != key_of(armature, scene):
-            found.append(armature)
-    return found
+    return [armature for armature in carriers(scene) if current(armature, scene) is None]

@@ -22,8 +22,13 @@ def ensure(context, armature) -> SampledRig:
 
 
 def known(armature, scene) -> SampledRig | None:
-    """The sampled motion if there is one that is not stale."""
+    """The sampled motion if there is one that is not out of date, also by what `notice` finds."""
     notice(armature, scene)
+    return current(armature, scene)
+
+
+def current(armature, scene) -> SampledRig | None:
+    """The sampled motion if there is one that is not known to be out of date."""
     found = session.rigs.get(armature.name_full)
     return found if found is not None and not found.stale and found.key == key_of(armature, scene) else None
 
