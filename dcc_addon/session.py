@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .kept import Bound, Followed, Prepared, Stood, Written
     from .scene.character.armature import PoseReader
     from .scene.files.save_as import Remade
+    from .scene.motion.sampled_from import Key
     from .services.threaded import Threaded
 
 
@@ -43,8 +44,8 @@ class SampledRig:
     """See `services.motion.trim_of`."""
     reader: PoseReader
     """Reads its pose anew."""
-    key: tuple
-    """What the sampling depended on besides the animation; see `scene.motion.sampled_from.key_of`."""
+    key: Key
+    """What the sampling depended on besides the animation."""
     bind_places: dict[str, np.ndarray]
     """World transforms (4, 4) of hair and bodies in the bind pose, by name."""
     stale: bool
@@ -79,7 +80,7 @@ class SampledRig:
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of the body meshes."""
-        return self.key[1]
+        return self.key.bodies
 
     def carrying(self, hair: str) -> Character:
         """The character as it carries a hair object: the identical object as long as it stays the same."""

@@ -25,7 +25,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
     if tuple(armature.pose.bones.keys()) != sampled.reader.bones:
         session.forget_motion(armature.name_full)
         raise NeuralocksError(f"{armature.name_full}: its bones have changed; press Sample Motion")
-    if moved and sampled.key[0] != timing_of(scene):
+    if moved and sampled.key.timing != timing_of(scene):
         sampled.stale = session.wanting = True
         if graph.mode == "RENDER":  # all scenes were sampled before the first was drawn
             _tell_misrendered(

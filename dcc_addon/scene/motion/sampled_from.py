@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a sampling of a rig's motion depends on, so that one that is out of date is noticed."""
 
+from typing import NamedTuple
+
 import bpy
 
 from ...session import session
@@ -43,14 +45,23 @@ def timing_of(scene) -> tuple:
     )
 
 
-def key_of(armature, scene) -> tuple:
-    """What a sampling of this armature depends on besides its animation; begins with `timing_of`."""
-    settings, bodies = armature.neuralocks_character, bodies_of(armature, scene)
-    return (
+class Key(NamedTuple):
+    """What a sampling of an armature depends on besides its animation: timing, chosen head and the names of all that is read."""
+
+    timing: tuple
+    head_bone: str
+    bones: tuple[str, ...]
+    bodies: tuple[str, ...]
+    hairs: tuple[str, ...]
+
+
+def key_of(armature, scene) -> Key:
+    """What a sampling of this armature depends on as the scene is."""
+    return Key(
         timing_of(scene),
-        tuple(body.name_full for body in bodies),
-        settings.head_bone,
+        armature.neuralocks_character.head_bone,
         tuple(armature.data.bones.keys()),
+        tuple(body.name_full for body in bodies_of(armature, scene)),
         tuple(sorted(o.name_full for o in hairs_of(armature, scene))),
     )
 
