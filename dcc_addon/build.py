@@ -9,9 +9,10 @@ import argparse
 import shutil
 import subprocess
 import sys
-import uuid
+import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -41,7 +42,7 @@ LEGACY = ("linux-x64", "3.11")
 """What the zip for Blender before 4.2 is built for: Linux distributions, which still carry it."""
 LEGACY_TOO = ("numpy",)
 """What the legacy zip also has: Debian's Blender comes without numpy. If there is one, it is found first."""
-NOT_SHIPPED = ("build.py", "__pycache__")
+NOT_SHIPPED = ("build.py", "blender_manifest.toml", "__pycache__")
 
 
 def main() -> int:
@@ -109,7 +110,7 @@ def extension(output: Path, platform: str, wheels: list[Path]) -> Path:
     # Top-level keys must come before the first table.
     head, table, tail = manifest.partition("[permissions]")
     out = output / f"neuralocks-{version(manifest)}-{platform}.zip"
-    with Written(out) as archive:
+    with written(out) as archive:
         archive.writestr("blender_manifest.toml", head + "\n".join(lines) + "\n" + table + tail)
         for path in sources():
             archive.write(path, path.relative_to(HERE).as_posix())
@@ -122,7 +123,7 @@ def legacy(output: Path, wheels: list[Path]) -> Path:
     """The zip for Blender before 4.2: a folder with the packages unpacked in it, and the first wheel, our own, as a file."""
     manifest = (HERE / "blender_manifest.toml").read_text(encoding="utf-8")
     out = output / f"neuralocks-{version(manifest)}-legacy-{LEGACY[0]}.zip"
-    with Written(out) as archive:
+    with written(out) as archive:
         for path in sources():
             archive.write(path, f"neuralocks/{path.relative_to(HERE).as_posix()}")
         own = wheels[0]  # for the Python that trains
@@ -137,10 +138,8 @@ def legacy(output: Path, wheels: list[Path]) -> Path:
 
 def sources() -> list[Path]:
     """Files of the add-on itself; the manifest is written with the wheels in it."""
-    files = [
-        p for p in sorted(HERE.rglob("*")) if p.is_file() and not set(p.relative_to(HERE).parts) & set(NOT_SHIPPED)
-    ]
-    return [p for p in files if p.name != "blender_manifest.toml" and p.suffix != ".pyc"]
+    files = (path for path in sorted(HERE.rglob("*")) if path.is_file() and path.suffix != ".pyc")
+    return [path for path in files if not set(path.relative_to(HERE).parts) & set(NOT_SHIPPED)]
 
 
 def version(manifest: str) -> str:
@@ -154,24 +153,14 @@ def pip(*arguments: str) -> None:
     subprocess.run([sys.executable, "-m", "pip", "--disable-pip-version-check", "-q", *arguments], check=True)
 
 
-class Written:
+@contextmanager
+def written(path: Path) -> Iterator[zipfile.ZipFile]:
     """A zip that appears under its name only when it is complete."""
-
-    def __init__(self, path: Path):
-        self._path = path
-
-    def __enter__(self) -> zipfile.ZipFile:
-        self._folder = self._path.parent / f".zip-{uuid.uuid4().hex}"
-        self._folder.mkdir()
-        self._part = self._folder / self._path.name
-        self._archive = zipfile.ZipFile(self._part, "w", zipfile.ZIP_DEFLATED, compresslevel=6)
-        return self._archive
-
-    def __exit__(self, kind, *_):
-        self._archive.close()
-        if kind is None:
-            self._part.replace(self._path)
-        shutil.rmtree(self._folder, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=".zip-", dir=path.parent, ignore_cleanup_errors=True) as folder:
+        part = Path(folder) / path.name
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+            yield archive
+        part.replace(path)
 
 
 if __name__ == "__main__":
