@@ -26,7 +26,8 @@ def in_chains(character: Character, tops: list[int], drives: np.ndarray, named: 
         ride = riders(character, joint, drives)
         if joint not in tops and joint not in named and _only_worn(character, joint, drives):
             ride.append(joint)
-        inside[skeleton.below(*ride)] = False
+        if ride:  # few do, and the whole hierarchy is walked for them
+            inside[skeleton.below(*ride)] = False
     return inside
 
 
