@@ -60,11 +60,13 @@ def examined(armature) -> tuple[RigArrays | None, int | None, str]:
 
 
 def _found_by(armature) -> tuple:
-    """The bones, what they are below and whether they deform, the skin, and the choice of the head."""
-    bones = armature.data.bones
+    """The bones, what they are below, where they rest and whether they deform, the skin, and the choice of the head."""
+    bones, chosen = armature.data.bones, armature.neuralocks_character.head_bone
     above = tuple(bone.parent.name if bone.parent else "" for bone in bones)
     deform = tuple(bone.use_deform for bone in bones)
-    return tuple(bones.keys()), above, deform, groups_of_skin(armature), armature.neuralocks_character.head_bone
+    rest = np.empty(3 * len(bones), np.float32)
+    bones.foreach_get("head_local", rest)
+    return tuple(bones.keys()), above, rest.tobytes(), deform, groups_of_skin(armature), chosen
 
 
 class PoseReader:

@@ -6,6 +6,7 @@ from unittest import SkipTest
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from dcc_addon.session import session
 from tests.blender import scenes
@@ -86,7 +87,7 @@ def head_of_a_control_rig(_folder: Path) -> None:
 
 
 def examined_again(_folder: Path) -> None:
-    """The panel tells of the rig as it is, also after its skin was bound and after a bone got another parent."""
+    """The panel tells of the rig as it is, also after its skin was bound, after a bone got another parent and after one was moved."""
     from dcc_addon.interface.panels import findings
 
     rig = scenes.armature(bones=(*scenes.BONES, ("copy", "chest", (0, 0, 1.55), (0, 0, 1.75))))
@@ -100,6 +101,10 @@ def examined_again(_folder: Path) -> None:
         rig.data.edit_bones["head"].parent = rig.data.edit_bones[parent]
         bpy.ops.object.mode_set(mode="OBJECT")
         assert any("No neck bone" in line for line in findings(rig)[0]) == told
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones["copy"].translate(Vector((0, 0.5, -0.4)))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert findings(rig)[0][0] == "Head: head"  # the one that moves the skin is elsewhere
 
 
 def _sampled(skin_bone: str, chosen: str = ""):
