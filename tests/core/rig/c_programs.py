@@ -3,6 +3,9 @@
 
 import shutil
 import subprocess
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -44,13 +47,25 @@ def compiled(folder, source, options=("-O2",), compiler=("gcc", "c", "c99")):
     """Build a program beside the header; skips where there is no such compiler."""
     if shutil.which(compiler[0]) is None:
         pytest.skip(f"no {compiler[0]} to compile the header with")
-    (folder / "main.src").write_text(source)
+    headers = {path.name: path.read_bytes() for path in folder.glob("*.h*")}
+    program = folder / "main"
+    program.write_bytes(_built(tuple(sorted(headers.items())), source, tuple(options), compiler))
+    program.chmod(0o755)
+    return program
+
+
+@cache  # most tests ask for a program that another has asked for
+def _built(headers, source, options, compiler) -> bytes:
+    """A program of a source and of the headers, (name, bytes) each, that lie beside it."""
     name, lang, std = compiler
     own = ["-Wcomma"] if "clang" in name else []
     command = [name, "-x", lang, f"-std={std}", *FLAGS, *own, *options, "main.src", "-lm", "-o", "main"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return folder / "main"
+    with TemporaryDirectory() as folder:
+        for file, text in (*headers, ("main.src", source.encode())):
+            (Path(folder) / file).write_bytes(text)
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return (Path(folder) / "main").read_bytes()
 
 
 def run_c(program, inputs, width):
