@@ -192,7 +192,8 @@ def test_real_hair_lies_on_another_head_and_bakes(tmp_path, names, model):
     for groom in grooms:
         used = groom.counts > 0
         assert np.abs(body.distance(groom.points[groom.starts[used]], limit=0.1)[0]).max() < 1e-4
-        assert (body.distance(groom.points, limit=0.01)[0] < -0.003).mean() < 1e-3
+        some = groom.points[np.repeat(np.arange(len(used)) % 5 == 0, groom.counts)]
+        assert (body.distance(some, limit=0.01)[0] < -0.003).mean() < 1e-3
     paths = [f"/Groom/{Path(name).name}" for name in names]
     out = bake(tmp_path / "real.usda", tmp_path / "hair.usdc", model, grooms=paths, frames="70").path
     card = evaluate(out, grooms=paths)
