@@ -144,4 +144,4 @@ def _fold():
 def test_the_droop_that_the_docs_tell_is_an_equilibrium():
     """Which does not depend on the steps in which the weight grew."""
     for form, turns in ((Cosserat.DIRECT, 3), (Cosserat.CONSTANT, 3), (Cosserat.DIRECT, 0)):
-        assert droop(form, turns, steps=4) == pytest.approx(droop(form, turns, steps=10), abs=1e-5)
+        assert droop(form, turns, steps=2) == pytest.approx(droop(form, turns), abs=1e-5)
