@@ -35,13 +35,13 @@ def test_simulated_hair_starts_at_rest_moves_and_keeps_its_length(tmp_path):
 
 def test_what_follows_simulated_hair_is_kept_out_of_the_body(tmp_path, monkeypatch):
     """And simulated strands stay as the solver has them. A report card covers both."""
-    shot, points, cards = write_shot(tmp_path, Recipe(strands=160, vertices=24, frames=20)), [], []
+    shot, points, cards = write_shot(tmp_path, Recipe(strands=160, vertices=24, frames=10)), [], []
     for name in ("free", "kept"):
         if name == "free":
             monkeypatch.setattr(Resolver, "apply", lambda *args: None)
         out = simulate(shot, tmp_path / f"{name}.usdc", strands=20).path
         monkeypatch.undo()
-        points.append(samples(out, "points", at=16.0).reshape(160, 24, 3))
+        points.append(samples(out, "points", at=10.0).reshape(160, 24, 3))
         cards.append(evaluate(out).grooms["/Hero/Hair"])
     item = read_baked(out).shot.grooms[0]
     every = strands_on(item.attachment.character, item.groom)

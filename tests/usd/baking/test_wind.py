@@ -111,7 +111,7 @@ def test_what_is_no_wind_is_refused(tmp_path, model, wrong):
 def test_a_bake_records_its_wind_and_a_report_compares_with_the_same(tmp_path):
     """A simulation in a wind, measured against the reference, is the reference; measured in a calm, it is not."""
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
-    shot = write_shot(tmp_path, Recipe(unit=0.01, up="Z", strands=10, bound="mesh", frames=24))
+    shot = write_shot(tmp_path, Recipe(unit=0.01, up="Z", strands=10, bound="mesh", frames=12))
     out = simulate(shot, tmp_path / "blown.usda", strands=10, wind=(0, -5, 2), gusts=0.8).path
     told = next(each for each in inspect(out)["grooms"] if each["path"] == HAIR)["baked with"]
     assert tuple(told["wind"]) == (0, -5, 2) and told["gusts"] == pytest.approx(0.8)

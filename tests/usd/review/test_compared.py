@@ -38,7 +38,7 @@ def test_a_loop_is_compared_with_a_loop(tmp_path, model):
 def test_a_simulation_is_compared_with_the_solver_as_it_was(tmp_path, monkeypatch):
     """The solver keeps strands apart if the bake records that."""
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
-    shot = write_shot(tmp_path, Recipe(frames=24, vertices=24))
+    shot = write_shot(tmp_path, Recipe(frames=12, vertices=24))
     for volume in (0.0, 3.0):
         simulate(shot, tmp_path / "hair.usdc", volume=volume)
         card = evaluate(tmp_path / "hair.usdc", reference=True)
