@@ -87,6 +87,7 @@ def like_names(folder: Path) -> None:
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)
     hairs = [scenes.hair(rig, 8, name=name) for name in ("前髪", "横髪", "後髪", "Hair.L", "Hair_L", "Hair L")]
+    scene.frame_end = 3
     scene.neuralocks.output = str(folder / "out.usdc")
     for hair in hairs:
         hair.neuralocks_hair.model = MODEL

@@ -138,8 +138,9 @@ def groomed_since(folder: Path) -> None:
     """
     needs_usd()
     rig, strands = scenes.dancer(20, skinned=True)
-    make_live(rig, strands)
     operators, scene = bpy.ops.neuralocks, bpy.context.scene
+    scene.frame_end = 6
+    make_live(rig, strands)
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     scene.neuralocks.output = str(folder / "hair.usdc")
 
