@@ -133,7 +133,7 @@ def test_hair_learns_to_move_in_a_minute(scene, in_one_process, tmp_path, monkey
         scene, tmp_path / "hair.neuralocks", options, rollouts=20, progress=lambda *a: messages.append(a)
     )
     report = model_file.read(path).meta["report"]["held out"]
-    assert report["motion"] < 0.7
+    assert report["motion"] < 0.62
     assert 0.5 < report["motion_ratio"] < 1.3
     assert report["position"] < 0.6 * report["rigid"]
     assert not (tmp_path / "hair.neuralocks.training").exists()
