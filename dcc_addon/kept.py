@@ -92,3 +92,13 @@ class Stood(NamedTuple):
     world: np.ndarray
     root: np.ndarray
     rest: int
+
+
+class Key(NamedTuple):
+    """What a sampling of an armature depends on besides its animation: timing, chosen head and the names of all that is read."""
+
+    timing: tuple
+    head_bone: str
+    bones: tuple[str, ...]
+    bodies: tuple[str, ...]
+    hairs: tuple[str, ...]

@@ -25,10 +25,9 @@ from .services.rig import BodyArrays, RigArrays
 if TYPE_CHECKING:
     from neuralocks_core.models.runtime import StrandModel
 
-    from .kept import Bound, Followed, Prepared, Stood, Written
+    from .kept import Bound, Followed, Key, Prepared, Stood, Written
     from .scene.character.armature import PoseReader
     from .scene.files.save_as import Remade
-    from .scene.motion.sampled_from import Key
     from .services.threaded import Threaded
 
 

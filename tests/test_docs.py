@@ -7,6 +7,7 @@ import ast
 import json
 import re
 from functools import cache
+from graphlib import TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
 from zipfile import ZipFile
@@ -215,6 +216,22 @@ def imported(path: Path, parts: int) -> set[str]:
             base = [*above, *(node.module.split(".") if node.module else [])]
             found |= {".".join([*base, each.name][:parts]) for each in node.names}
     return found
+
+
+@pytest.mark.parametrize("package", FOLDERS[:3])
+def test_no_modules_import_each_other_in_a_circle(package):
+    """Not even for types in annotations."""
+    parts = {path: path.relative_to(ROOT).with_suffix("").parts for path in (ROOT / package).rglob("*.py")}
+    names = {path: ".".join(each).removesuffix(".__init__") for path, each in parts.items()}
+    graph = {name: set() for name in names.values()}
+    for path, name in names.items():
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                above = parts[path][: -node.level] if node.level else ()
+                base = ".".join([*above, *filter(None, [node.module])])
+                for each in node.names:  # a module of a package, or what a module defines
+                    graph[name] |= {f"{base}.{each.name}" if f"{base}.{each.name}" in graph else base} & graph.keys()
+    assert list(TopologicalSorter(graph).static_order())
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)

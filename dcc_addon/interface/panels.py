@@ -8,8 +8,8 @@ from neuralocks_core.motion import LOOP_GAP
 
 from ..operators.training import job, known_problem, notes
 from ..scene.baked import as_keyed, attach
-from ..scene.character.armature import examined
 from ..scene.character.body import left_behind
+from ..scene.character.examined import examined
 from ..scene.files.paths import usual_output
 from ..scene.hair import imported
 from ..scene.keys import hair_keys

@@ -2,7 +2,7 @@
 """What moves hair, strands and bones alike: what a character is set to, and a model, as numbers of a record; see `recorded`."""
 
 from ...services.wind import Blowing
-from ..character.armature import examined
+from ..character.examined import examined
 from ..files.paths import MODELS, full, library_of
 from ..objects.recorded import number_of
 from .as_baked import print_of

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a sampling of a rig's motion depends on, so that one that is out of date is noticed."""
 
-from typing import NamedTuple
-
 import bpy
 
+from ...kept import Key
 from ...session import session
 from ..character.carried import bodies_of, hairs_of
 from ..drawing.clock import rate_of, stretch_of
@@ -43,16 +42,6 @@ def timing_of(scene) -> tuple:
         round(rate_of(scene), 6),
         round(scene.unit_settings.scale_length, 9),
     )
-
-
-class Key(NamedTuple):
-    """What a sampling of an armature depends on besides its animation: timing, chosen head and the names of all that is read."""
-
-    timing: tuple
-    head_bone: str
-    bones: tuple[str, ...]
-    bodies: tuple[str, ...]
-    hairs: tuple[str, ...]
 
 
 def key_of(armature, scene) -> Key:
