@@ -23,7 +23,11 @@ def remake(items) -> None:
             continue
         if not isinstance(thing, bpy.types.Object) or thing.library is not None:
             continue
-        for setting, path in models_from_here(thing).items():
-            whole = os.path.normpath(full(path, library, named_from.folder(thing, setting)))
+        named = models_from_here(thing)
+        folders = {
+            setting: named_from.folder(thing, setting) for setting in named
+        }  # all: writing a path notes new ones
+        for setting, path in named.items():
+            whole = os.path.normpath(full(path, library, folders[setting]))
             set_path(thing, setting, relative(whole, here) if here else whole)
         named_from.remember([thing])

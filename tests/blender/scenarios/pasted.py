@@ -60,6 +60,30 @@ def pasted(folder: Path) -> None:
         assert _models(bpy.data.objects) == [moved / "mine.neuralocks"] * 2
 
 
+def pasted_with_two_models(folder: Path) -> None:
+    """What names models of both kinds names both where it is pasted: writing one path forgets no folder of the other."""
+    if not hasattr(bpy.app.handlers, "blend_import_post"):
+        raise SkipTest("this Blender does not report what it pastes")
+    (shots := folder / "shots").mkdir()
+    model = Path(shutil.copy(MODEL, shots / "mine.neuralocks"))
+    settings = bpy.context.preferences.filepaths
+    before = settings.temporary_directory
+    settings.temporary_directory = str(folder)
+    try:
+        strands = scenes.hair(scenes.armature(), 20)
+        bpy.ops.wm.save_as_mainfile(filepath=str(shots / "shot.blend"))
+        strands.neuralocks_hair.model = strands.neuralocks_character.rig_model = "//mine.neuralocks"
+        _copy()
+        scenes.empty()
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "other.blend"))
+        assert bpy.ops.view3d.pastebuffer() == {"FINISHED"}
+    finally:
+        settings.temporary_directory = before
+    (hair,) = (thing for thing in bpy.context.selected_objects if thing.type == "CURVES")
+    named = hair.neuralocks_hair.model, hair.neuralocks_character.rig_model
+    assert [Path(bpy.path.abspath(path)).resolve() for path in named] == [model] * 2, named
+
+
 def _copied(model: Path) -> None:
     """Copy what is in the file, and paste it there: all of it names the model."""
     _copy()
