@@ -117,7 +117,7 @@ class Session:
     grooms: dict[str, int] = field(default_factory=dict)
     """A number of the rest points of each groom that plays a cache, by the name of its Curves; dropped when these are edited."""
     examined: dict[str, tuple[tuple, tuple[RigArrays | None, int | None, str]]] = field(default_factory=dict)
-    """What was found in armatures, by name, after what it was found by; see `scene.character.armature`."""
+    """What was found in armatures, by name, after what it was found by; see `scene.character.examined`."""
     bodies: dict[tuple, tuple] = field(default_factory=dict)
     """Numbers of the bodies of an armature in a scene; dropped when an edit may change them. See `scene.baked.body_known`."""
     surfaces: dict[str, tuple[set[str], int]] = field(default_factory=dict)
