@@ -129,7 +129,7 @@ def _live(hair, rig, model: str):
     bpy.ops.neuralocks.sample_motion()
     for frame in (1, 2):
         scene.frame_set(frame)
-    assert not session.messages, session.messages
+    assert not session.said.messages, session.said.messages
     return hair
 
 

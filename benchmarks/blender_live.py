@@ -61,7 +61,7 @@ def live(scenes, model: str, count: int) -> dict[str, float]:
     result = {"live": median(scene, FRAMES), "without": plain}
     from dcc_addon.session import session
 
-    assert not session.messages, session.messages
+    assert not session.said.messages, session.said.messages
     hair.neuralocks_hair.live = False
     return result
 

@@ -57,7 +57,7 @@ def doubt(closely: bool = True) -> None:
 def cancel() -> None:
     """Stop; the motion stays out of date."""
     _work.clear()
-    session.sampling = None
+    session.sampling.done = None
     if bpy.app.timers.is_registered(look):
         bpy.app.timers.unregister(look)
 
@@ -79,7 +79,7 @@ def look() -> float | None:
                     notice(armature, scene)
         todo = _todo(scenes)
         if todo is None:
-            session.sampling = None
+            session.sampling.done = None
             redraw()
             return None
         scene, armature = todo
@@ -88,10 +88,10 @@ def look() -> float | None:
     with working_in(scene, layer_shown(scene)):
         _go_on()
     if not _work:
-        session.sampling = None
+        session.sampling.done = None
         for shown in drawing(scene):
             refresh(shown)
-        session.wanting = False  # the next look finds what else is out of date, without a start of its own
+        session.sampling.wanting = False  # the next look finds what else is out of date, without a start of its own
     redraw()
     return 0.01
 
@@ -101,7 +101,7 @@ def _todo(scenes: list) -> tuple | None:
     seen = set()
     for scene in scenes:
         for armature in needs_sampling(scene):
-            if armature not in seen and armature.name_full not in session.failed:
+            if armature not in seen and armature.name_full not in session.sampling.failed:
                 return scene, armature
         seen |= set(carriers(scene))
     return None
@@ -118,11 +118,11 @@ def _go_on() -> None:
     _, name, slices = _work[0]
     try:
         for done, total in slices:
-            session.sampling = done / total
+            session.sampling.done = done / total
             return
     except Exception as error:
-        session.tell(name, error)
-        session.failed.add(name)
+        session.said.tell(name, error)
+        session.sampling.failed.add(name)
     _work.clear()
 
 

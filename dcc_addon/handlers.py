@@ -114,26 +114,26 @@ def before_save(target=None, *_):
     """Save the hair at rest, so that the file opens right without the add-on, and paths with which it finds its models; Blender
     says since 4.0 where the file will be.
     """
-    session.blurred = blur.end()
+    session.saving.blurred = blur.end()
     model_updates.remember()
     make_comparable(bpy.data.objects)
     as_groomed.keep(bpy.data.objects)
     for scene in bpy.data.scenes:
         view.show_rest(scene)
     show_all_rest()
-    session.remade = _unseen(lambda: Remade(target or bpy.data.filepath))
+    session.saving.remade = _unseen(lambda: Remade(target or bpy.data.filepath))
     named_from.forget()
 
 
 @persistent
 def after_save(*_):
     """Continue as before the save, in all scenes."""
-    if session.remade is not None:
-        _unseen(session.remade.put_back)
+    if session.saving.remade is not None:
+        _unseen(session.saving.remade.put_back)
     named_from.remember(bpy.data.objects)
     for scene in in_view_last(bpy.data.scenes):
         view.refresh(scene)
-    blurred, session.blurred = session.blurred, []
+    blurred, session.saving.blurred = session.saving.blurred, []
     for hair in filter(None, map(find, blurred)):
         blur.again(hair)
 
@@ -149,14 +149,14 @@ def before_render(scene, *_):
     """A render must be right: sample now what is out of date, even if only the drawn pose shows it, and print which hair will not
     move on the console, which is all that a render farm keeps.
     """
-    session.misrendered.clear()
+    session.said.misrendered.clear()
     for drawn in drawn_with(scene):
         with working_in(drawn, layer_shown(drawn)):
             _make_ready(drawn)
         hairs = lively(drawn.objects).hairs
         for thing in [*hairs, *view.carriers(drawn)]:
-            if thing.name_full in session.messages:
-                print(f"Neuralocks: {session.messages[thing.name_full]}")
+            if thing.name_full in session.said.messages:
+                print(f"Neuralocks: {session.said.messages[thing.name_full]}")
         for hair in hairs:
             blur.begin(hair, drawn)
 
@@ -168,7 +168,7 @@ def _make_ready(scene) -> None:
         try:
             ensure(bpy.context, armature)
         except NeuralocksError as error:
-            session.messages[armature.name_full] = str(error)
+            session.said.messages[armature.name_full] = str(error)
     view.refresh(scene, wait=True)
 
 
@@ -189,8 +189,8 @@ def _unseen(change):
 
 def _catch_up() -> None:
     """Sample soon, if live hair found its motion missing or out of date."""
-    if session.wanting:
-        session.wanting = False
+    if session.sampling.wanting:
+        session.sampling.wanting = False
         background.want()
 
 

@@ -20,9 +20,9 @@ def forget_data(graph) -> None:
     body_known.updated(graph.updates)
     for thing in (update.id for update in graph.updates):
         if isinstance(thing, bpy.types.Mesh):
-            session.weights.pop(thing.name_full, None)
+            session.read.weights.pop(thing.name_full, None)
         elif isinstance(thing, bpy.types.Curves):
-            session.grooms.pop(thing.name_full, None)
+            session.read.grooms.pop(thing.name_full, None)
 
 
 def mark_stale(graph, changed, carriers, switched: set[str]) -> None:
@@ -43,16 +43,16 @@ def mark_stale(graph, changed, carriers, switched: set[str]) -> None:
     for sampled in found:
         sampled.stale = True
     session.edits += 1
-    session.failed.clear()
+    session.sampling.failed.clear()
     lacking = any(armature.name_full not in session.rigs for armature in carriers)
-    session.wanting = session.wanting or bool(found) or lacking
+    session.sampling.wanting = session.sampling.wanting or bool(found) or lacking
 
 
 def retry_failed(changed) -> None:
     """Motions that could not be sampled are wanted again if one of their armatures or any rest pose was edited."""
-    if any(isinstance(thing, bpy.types.Armature) or thing.name_full in session.failed for thing in changed):
-        session.wanting = session.wanting or bool(session.failed)
-        session.failed.clear()
+    if any(isinstance(thing, bpy.types.Armature) or thing.name_full in session.sampling.failed for thing in changed):
+        session.sampling.wanting = session.sampling.wanting or bool(session.sampling.failed)
+        session.sampling.failed.clear()
 
 
 def hair_placed(graph) -> bool:

@@ -29,7 +29,7 @@ def words(layout, text: str, icon: str, lines: int = 0) -> int:
 
 def message(layout, name: str) -> None:
     """What went wrong with an object, or what it waits for, if anything."""
-    if text := session.messages.get(name):
+    if text := session.said.messages.get(name):
         words(layout, for_the_panel(text), "TIME" if text.endswith(FIRST) else "ERROR")
 
 

@@ -65,8 +65,8 @@ def _motion(layout, armature, scene) -> None:
     if sampled is not None and character.body is None and sampled.bodies:
         words(layout, f"Body: {', '.join(sampled.bodies)}", "INFO")
     row = layout.row()
-    if session.sampling is not None:
-        row.label(text=f"Sampling {100 * session.sampling:.0f} %", icon="TIME")
+    if session.sampling.done is not None:
+        row.label(text=f"Sampling {100 * session.sampling.done:.0f} %", icon="TIME")
     elif sampled is None:
         row.label(text="Not sampled", icon="QUESTION")
     elif sampled.stale:
@@ -91,7 +91,7 @@ def _motion(layout, armature, scene) -> None:
     if sampled is not None:
         for text in (*(() if character.loop else sampled.leaps), *sampled.bodies_off, *sampled.hairs_off.values()):
             words(layout, text, "INFO")
-    if text := session.misrendered.get(armature.name_full):
+    if text := session.said.misrendered.get(armature.name_full):
         words(layout, text, "ERROR")
     message(layout, armature.name_full)
 
@@ -165,7 +165,7 @@ class NEURALOCKS_PT_strands(_Panel, bpy.types.Panel):
             words(layout, "No body mesh found; choose it above", "INFO")
         layout.operator("neuralocks.reset_look", text="Reset", icon="LOOP_BACK")
         layout.operator("neuralocks.report_card", text="Report Card", icon="PRESET")
-        for line in session.cards.get(hair.name_full, ()):
+        for line in session.said.cards.get(hair.name_full, ()):
             words(layout, line, "NONE")
 
 
@@ -186,8 +186,8 @@ def _training(layout, settings, kind: str) -> None:
         if problem := known_problem():
             words(layout, problem, "INFO")
             layout.operator("neuralocks.copy_install", icon="COPYDOWN")
-        if session.trained is not None:
-            text, well = session.trained
+        if session.said.trained is not None:
+            text, well = session.said.trained
             words(layout, for_the_panel(text), "CHECKMARK" if well else "ERROR")
         _notes(layout)
         return
@@ -221,7 +221,7 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         own = armature.neuralocks_character
         layout.prop(own, "chains", **hint("Found automatically"))
         layout.operator("neuralocks.find_chains", icon="BONE_DATA")
-        for line in session.cards.get(armature.name_full, ()):
+        for line in session.said.cards.get(armature.name_full, ()):
             words(layout, line, "NONE")
         layout.prop(own, "rig_model", **hint("Shipped with the add-on"))
         _training(layout, settings, "rig")

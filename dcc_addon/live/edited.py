@@ -25,26 +25,28 @@ def write(hair, points: np.ndarray, world: np.ndarray, rest: np.ndarray) -> None
     """Show points (P, 3) of hair that stands at `world` (4, 4), and remember them and its rest shape (P, 3)."""
     curves.write(hair.data, points)
     of, places = (identity(hair), identity(hair.data)), (matrix(hair.matrix_basis), world)
-    before = session.written.get(hair.name_full)
+    before = session.shown.written.get(hair.name_full)
     if before is not None and before.of == of and before.points.shape == points.shape:
         kept, spare = before.points, before.spare
         np.copyto(kept, points)
     else:
         kept, spare = points.copy(), np.empty_like(points)
-    session.written[hair.name_full] = Written(of, kept, places, tuple(hair.modifiers.keys()), rest, spare)
+    session.shown.written[hair.name_full] = Written(of, kept, places, tuple(hair.modifiers.keys()), rest, spare)
 
 
 def forget(hair) -> None:
     """The points were put back: what was written to this hair no longer counts, nor to another object with the same curves."""
     data, own = identity(hair.data), hair.name_full
-    session.written = {name: each for name, each in session.written.items() if name != own and each.of[1] != data}
+    session.shown.written = {
+        name: each for name, each in session.shown.written.items() if name != own and each.of[1] != data
+    }
 
 
 def intact(hair) -> bool:
     """Whether the hair has the curves that were written to last, with the same number of points. If so, each point has a rest
     shape; points joined since then may have none.
     """
-    before, data = session.written.get(hair.name_full), hair.data
+    before, data = session.shown.written.get(hair.name_full), hair.data
     if before is None or before.of != (identity(hair), identity(data)):
         return False
     return len(before.points) == len(data.points)
@@ -54,12 +56,12 @@ def touched(hair) -> bool:
     """Whether something was done to the points since they were written, or their rest shape is gone. Modifiers that were removed
     without effect are forgotten.
     """
-    before, data = session.written.get(hair.name_full), hair.data
+    before, data = session.shown.written.get(hair.name_full), hair.data
     if before is None or before.of[0] != identity(hair):
         return False
     if len(before.points) == len(data.points):
         if np.array_equal(curves.shown(data, before.spare), before.points):
-            session.written[hair.name_full] = before._replace(modifiers=tuple(hair.modifiers.keys()))
+            session.shown.written[hair.name_full] = before._replace(modifiers=tuple(hair.modifiers.keys()))
             return not curves.has_rest(data)
         if before.of[1] == identity(data):
             return True
@@ -79,13 +81,13 @@ def follow(hair, sampled, world: np.ndarray) -> None:
         NeuralocksError: it cannot follow, for example after a modifier was applied to moved hair; live is then off.
     """
     name, data = hair.name_full, hair.data
-    before = session.written.get(name)
+    before = session.shown.written.get(name)
     if before is None and curves.has_rest(data) and _follow_again(hair):
-        sampled.stale = session.wanting = True  # it may have stood elsewhere then
+        sampled.stale = session.sampling.wanting = True  # it may have stood elsewhere then
     if not touched(hair):
         return
     now = curves.shown(data)
-    del session.written[name]
+    del session.shown.written[name]
     same = len(now) == len(before.points)
     if same and not curves.has_rest(data):
         curves.put_aside(data, before.rest)
@@ -100,7 +102,7 @@ def follow(hair, sampled, world: np.ndarray) -> None:
             break
     else:
         change = [*_applied(hair, before), "its points were changed"][0]
-    session.followed.append(Followed(identity(data), _checksum(data), now, change))
+    session.shown.followed.append(Followed(identity(data), _checksum(data), now, change))
     if isinstance(change, str):
         _refuse(hair, change)
     curves.move_rest(data, change)
@@ -129,7 +131,7 @@ def _follow_again(hair) -> bool:
     done to them.
     """
     data = hair.data
-    own = [each for each in session.followed if each.of == identity(data)]
+    own = [each for each in session.shown.followed if each.of == identity(data)]
     if own:
         now, rest = curves.shown(data), _checksum(data)
         again = [each.change for each in own if each.rest == rest and np.array_equal(each.points, now)]

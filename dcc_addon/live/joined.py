@@ -20,29 +20,29 @@ from .edited import ROUNDING
 
 def remember(hair, rest: int) -> None:
     """Note where hair stands whose points have just been written; `rest` is the checksum of `curves.points`."""
-    written = session.written[hair.name_full]
+    written = session.shown.written[hair.name_full]
     # Not read from Blender, which copies the whole of an attribute shared with the evaluated hair before it can be read.
     root = written.rest[0].copy()  # not a view, which would keep all of the rest shape of hair that is deleted
-    session.stood[identity(hair)] = Stood(written.points, written.places[1], root, rest)
+    session.shown.stood[identity(hair)] = Stood(written.points, written.places[1], root, rest)
 
 
 def forget(hair) -> None:
     """Live is over for this hair."""
-    session.stood.pop(identity(hair), None)
+    session.shown.stood.pop(identity(hair), None)
 
 
 def settle(hair) -> None:
     """Convert the rest shapes of live hair that was joined to this hair into its space, if that is still to be done: also after an
     undo, which goes back to Blender's own result.
     """
-    data, written = hair.data, session.written.get(hair.name_full)
+    data, written = hair.data, session.shown.written.get(hair.name_full)
     if written is not None and len(written.points) == len(data.points):
         return
-    if data.library is not None or not session.stood or not curves.has_rest(data):
+    if data.library is not None or not session.shown.stood or not curves.has_rest(data):
         return
     there = {identity(thing) for scene in bpy.data.scenes for thing in scene.objects}
     here = matrix(hair.matrix_world)
-    for stood in (stood for number, stood in session.stood.items() if number not in there):
+    for stood in (stood for number, stood in session.shown.stood.items() if number not in there):
         for part in _parts(data, stood):
             change = inverse(here) @ stood.world
             moved = transformed(stood.points, change)

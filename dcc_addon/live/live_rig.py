@@ -21,7 +21,7 @@ def update(armature, scene, graph, moved: bool = False) -> None:
         _update(armature, scene, graph, moved)
     except NeuralocksError as error:
         show_rest(armature)
-        session.messages[armature.name_full] = str(error)
+        session.said.messages[armature.name_full] = str(error)
 
 
 def _update(armature, scene, graph, moved) -> None:
@@ -46,7 +46,7 @@ def _update(armature, scene, graph, moved) -> None:
             armature.update_tag(refresh={"OBJECT", "DATA", "TIME"})
         else:
             armature.update_tag()
-    session.messages.pop(armature.name_full, None)
+    session.said.messages.pop(armature.name_full, None)
 
 
 def bind(armature, sampled) -> Bound:

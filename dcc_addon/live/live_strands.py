@@ -67,7 +67,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
     frame = shown_frame(scene)
     row = sampled.motion.row(frame)
     if moved and row is not None and _elsewhere(hair, place, sampled, row, graph):
-        sampled.stale = session.wanting = True
+        sampled.stale = session.sampling.wanting = True
     to_local = inverse(core @ place)
     time = frame / sampled.motion.rate
     wind = blowing(armature).in_core()
@@ -86,7 +86,7 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
         # The render of an older Blender shows the points of the previous frame unless the object is updated, too; with its
         # animation, because it is copied as the viewport has it, at another frame.
         hair.update_tag(refresh={"OBJECT", "DATA", "TIME"})
-    session.messages.pop(hair.name_full, None)
+    session.said.messages.pop(hair.name_full, None)
 
 
 def _sampled_with(hair, home) -> tuple:
@@ -270,7 +270,7 @@ def show_all_rest() -> None:
     for data in bpy.data.hair_curves:
         if data.library is None:
             curves.restore_rest(data)
-    session.written.clear()
+    session.shown.written.clear()
 
 
 def show_rest(hair) -> None:
@@ -290,4 +290,4 @@ def _restore(hair) -> None:
 def _give_up(hair, message: str) -> None:
     """Show rest hair and say why, instead of hair of another frame."""
     show_rest(hair)
-    session.messages[hair.name_full] = message
+    session.said.messages[hair.name_full] = message

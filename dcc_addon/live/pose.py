@@ -26,7 +26,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
         session.forget_motion(armature.name_full)
         raise NeuralocksError(f"{armature.name_full}: its bones have changed; press Sample Motion")
     if moved and sampled.key.timing != timing_of(scene):
-        sampled.stale = session.wanting = True
+        sampled.stale = session.sampling.wanting = True
         if graph.mode == "RENDER":  # all scenes were sampled before the first was drawn
             _tell_misrendered(
                 armature.name_full,
@@ -46,7 +46,7 @@ def pose(armature, sampled, scene, graph, moved: bool, body: bool = False) -> np
         if moved and graph.mode == "RENDER" and others_called():
             _tell_late(armature.name_full)
         elif moved:
-            sampled.stale = session.wanting = True
+            sampled.stale = session.sampling.wanting = True
             if graph.mode == "RENDER":
                 _tell_misrendered(
                     armature.name_full,
@@ -69,8 +69,8 @@ def _tell_late(name: str) -> None:
         f"{name}: the render poses it differently from the view, so hair may be wrong; if a script poses it after each "
         "frame change (frame_change_post), make it do so before (frame_change_pre)"
     )
-    if session.messages.get(name) != message:
-        session.messages[name] = message
+    if session.said.messages.get(name) != message:
+        session.said.messages[name] = message
         print(f"Neuralocks: {message}")
 
 
@@ -78,6 +78,6 @@ def _tell_misrendered(name: str, fact: str) -> None:
     """Say, also on the console, that a render shows a character otherwise than it was sampled, of which nothing told before: its hair
     remembers the motion of before, also in later frames that are as they were.
     """
-    if name not in session.misrendered:
-        session.misrendered[name] = f"{name}: {fact}"
-        print(f"Neuralocks: {session.misrendered[name]}")
+    if name not in session.said.misrendered:
+        session.said.misrendered[name] = f"{name}: {fact}"
+        print(f"Neuralocks: {session.said.misrendered[name]}")

@@ -42,6 +42,6 @@ def look() -> float | None:
             session.hairs[name] = job.result()
             then(name)
         except Exception as error:
-            session.tell(name, error)
+            session.said.tell(name, error)
     redraw()
     return LOOK if session.preparing else None

@@ -15,7 +15,7 @@ def unsampled(name: str, why: str = "its motion is not sampled yet") -> Neuraloc
     """The error that an armature's motion is unknown. Making it requests the motion: with a window, it is sampled in the
     background, unless that has failed.
     """
-    failed = name in session.failed
-    session.wanting = session.wanting or not failed
+    failed = name in session.sampling.failed
+    session.sampling.wanting = session.sampling.wanting or not failed
     told = f"{why}; press Sample Motion" if bpy.app.background or failed else FIRST
     return NeuralocksError(f"{name}: {told}")

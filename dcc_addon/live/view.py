@@ -27,7 +27,7 @@ def strands_toggled(hair, scene, wait: bool) -> None:
 
 def rig_toggled(armature, scene) -> None:
     """The Live switch of the hair bones was used."""
-    session.messages.pop(armature.name_full, None)
+    session.said.messages.pop(armature.name_full, None)
     if armature.neuralocks_character.rig_live:
         lock()
         refresh(scene)
@@ -108,7 +108,7 @@ def forget_gone() -> None:
     """Drop messages about objects that were renamed or deleted: another object may get such a name. So is hair that was prepared for
     one, or written to it: a large groom holds hundreds of megabytes.
     """
-    kept = session.messages, session.misrendered, session.cards, session.hairs, session.written
+    kept = session.said.messages, session.said.misrendered, session.said.cards, session.hairs, session.shown.written
     for gone in [name for name in set().union(*kept) if find(name) is None]:
         for each in kept:
             each.pop(gone, None)
@@ -119,15 +119,15 @@ def forget_ended() -> None:
     own = lively(bpy.data.objects)
     named = (*own.hairs, *own.armatures, *(hair.neuralocks_hair.armature for hair in own.hairs))
     live = {thing.name_full for thing in named if thing is not None}
-    for name in session.messages.keys() - live:
-        del session.messages[name]
+    for name in session.said.messages.keys() - live:
+        del session.said.messages[name]
 
 
 def bereft(scene) -> bool:
     """Whether hair of the scene is still shown as an armature moved it that has been deleted."""
-    if not session.written:
+    if not session.shown.written:
         return False
-    moved = (hair for hair in lively(scene.objects).hairs if hair.name_full in session.written)
+    moved = (hair for hair in lively(scene.objects).hairs if hair.name_full in session.shown.written)
     found = (hair.neuralocks_hair.armature for hair in moved)
     return any(armature is None or not in_scene(armature, scene) for armature in found)
 

@@ -205,8 +205,8 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
         name = hair.name_full
         with temporary_folder() as folder:
             baked = yield from bake_steps(context, armature, [hair], os.path.join(folder, "card.usdc"))
-            session.cards[name] = yield from _card(baked.hair[name][0], baked.prims)
-        for line in session.cards[name]:
+            session.said.cards[name] = yield from _card(baked.hair[name][0], baked.prims)
+        for line in session.said.cards[name]:
             self.report({"INFO"}, line)
         return f"{name}: report card made"
 

@@ -153,7 +153,7 @@ class Stepwise(Hardened):
         context.window_manager.progress_end()
         for workspace in bpy.data.workspaces:  # another one may be shown by now
             workspace.status_text_set(None)
-        session.sampling = None
+        session.sampling.done = None
 
 
 def sampling(context, armature, share: float = 1.0):

@@ -48,7 +48,7 @@ class NEURALOCKS_OT_find_chains(Stepwise, bpy.types.Operator):
             f"{sampled.rig.said(chains.chain_name(i))}: {int((chains.chain == i).sum())} bones, {100 * chains.chain_length(i):.0f} cm"
             for i in range(len(chains.roots))
         ]
-        session.cards[name] = lines
+        session.said.cards[name] = lines
         return f"{name}: {len(chains)} hair bones in {len(lines)} chains"
 
 

@@ -41,7 +41,7 @@ def job() -> TrainingJob | None:
 
 def notes() -> list[str]:
     """What an artist should know about the running training, or else the last one, in the words of the panel."""
-    return _running[0].notes() if _running else session.trained_notes
+    return _running[0].notes() if _running else session.said.trained_notes
 
 
 def stop() -> None:
@@ -145,7 +145,7 @@ class NEURALOCKS_OT_train(Stepwise, bpy.types.Operator):
             if out is not None:
                 abandon(out)
             raise
-        session.trained, session.trained_notes = None, []
+        session.said.trained, session.said.trained_notes = None, []
         bpy.app.timers.register(watch, first_interval=0.5, persistent=True)
         return f"Training a model for {target.name_full} in the background"
 
@@ -220,7 +220,7 @@ def finish() -> str | None:
             set_path(target, setting, running.out)
         _remember()
         message, well = f"{target.name_full}: trained", True
-    session.trained, session.trained_notes = (message, well), notes()
+    session.said.trained, session.said.trained_notes = (message, well), notes()
     stop()
     refresh(bpy.context.scene)
     return message

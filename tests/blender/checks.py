@@ -38,7 +38,7 @@ def messages():
     """The problems that the panel shows, by object name."""
     from dcc_addon.session import session
 
-    return session.messages
+    return session.said.messages
 
 
 def refused(call, *words):

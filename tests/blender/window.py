@@ -85,7 +85,7 @@ def sampled():
     """The background has sampled the motion while Blender was idle: the hair moves."""
     from dcc_addon.session import session
 
-    assert session.rigs and not session.rigs["Rig"].stale and session.sampling is None, session.messages
+    assert session.rigs and not session.rigs["Rig"].stale and session.sampling.done is None, session.said.messages
     assert np.abs(shown() - state["rest"]).max() > 1e-3
     state["twelve"] = shown()
 
@@ -108,7 +108,7 @@ def kept_out_of(*bodies: str):
     """The background has noticed which bodies renders draw."""
     from dcc_addon.session import session
 
-    assert session.rigs["Rig"].bodies == bodies and session.sampling is None
+    assert session.rigs["Rig"].bodies == bodies and session.sampling.done is None
 
 
 def put_hair(height: float):
@@ -121,7 +121,7 @@ def sampled_at(height: float):
     from dcc_addon.session import session
 
     first = session.rigs["Rig"].motion.places["Hair"][0]
-    assert abs(first[2, 3] - height) < 1e-6 and session.sampling is None, first
+    assert abs(first[2, 3] - height) < 1e-6 and session.sampling.done is None, first
 
 
 def bake():

@@ -79,6 +79,6 @@ def _model(hair) -> int | None:
 
 def _number_of(data) -> int:
     """A number of the points at rest. The panel asks in every redraw, and a large groom takes longer to read than that may take."""
-    if data.name_full not in session.grooms:
-        session.grooms[data.name_full] = zlib.crc32(points(data))
-    return session.grooms[data.name_full]
+    if data.name_full not in session.read.grooms:
+        session.read.grooms[data.name_full] = zlib.crc32(points(data))
+    return session.read.grooms[data.name_full]

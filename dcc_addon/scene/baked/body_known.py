@@ -31,31 +31,31 @@ def numbers_of_bodies(armature, scene) -> tuple[int | None, int | None]:
     # Blender does not tell of objects of a scene that is not in view, nor do older ones of a driver that is removed.
     counts = len(scene.objects), sum(len(each.drivers) for each in data if each is not None)
     key = identity(armature), identity(scene), chosen and identity(chosen), counts
-    if key not in session.bodies:
+    if key not in session.read.bodies:
         bodies = bodies_of(armature, scene)
         shapes, driven = sorted(map(_number_of, bodies)), [number_of_drivers(body.data) for body in bodies]
         known = bodies or any(armature in deforming(thing) for thing in scene.objects if thing.type == "MESH")
         numbers = recorded.number_of(shapes), recorded.number_of(sorted(filter(None, driven)))
-        session.bodies[key] = numbers if known else (None, None)
-    return session.bodies[key]
+        session.read.bodies[key] = numbers if known else (None, None)
+    return session.read.bodies[key]
 
 
 def updated(updates) -> None:
     """Look again at what an update of Blender's may have changed; `updates` are those of a depsgraph."""
-    if not (session.bodies or session.surfaces):
+    if not (session.read.bodies or session.read.surfaces):
         return
     ids, others = [update.id for update in updates], any(map(_regroups, updates))
     shaped = [thing.original for thing in ids if isinstance(thing, SHAPED)]
     meshes = {thing if isinstance(thing, bpy.types.Mesh) else thing.user for thing in shaped}
-    known = set() if others else {mesh for mesh in meshes if mesh.name_full in session.surfaces}
+    known = set() if others else {mesh for mesh in meshes if mesh.name_full in session.read.surfaces}
     own = [thing.original for thing in ids] if known else []
     # One that takes only the shape of another pose, by drivers, is known still.
     edited = {mesh for mesh in meshes if mesh not in known or not follows(mesh, own)}
     if others or edited:
-        session.bodies.clear()
+        session.read.bodies.clear()
     replayed = _replayed({thing.original for thing in ids if isinstance(thing, bpy.types.Action)}) if others else set()
     for name in replayed.union(mesh.name_full for mesh in edited):
-        session.surfaces.pop(name, None)
+        session.read.surfaces.pop(name, None)
 
 
 def _regroups(update) -> bool:
@@ -72,9 +72,12 @@ def _regroups(update) -> bool:
 def _number_of(body) -> int:
     """Of its surface, known as long as the same shape keys are animated: older Blenders do not tell of a driver that is removed."""
     mesh = body.data
-    moving, known = animated(mesh.shape_keys and mesh.shape_keys.animation_data), session.surfaces.get(mesh.name_full)
+    moving, known = (
+        animated(mesh.shape_keys and mesh.shape_keys.animation_data),
+        session.read.surfaces.get(mesh.name_full),
+    )
     if known is None or known[0] != moving:
-        known = session.surfaces[mesh.name_full] = moving, recorded.number_of(_surface(body))
+        known = session.read.surfaces[mesh.name_full] = moving, recorded.number_of(_surface(body))
     return known[1]
 
 

@@ -46,11 +46,11 @@ def read(mesh_object, armature) -> BodyArrays:
             f"{mesh_object.name_full}: it has no faces to keep hair out of; choose a body with a surface, or none"
         )
     points = vertices(mesh).astype(float)
-    session.vertices[mesh.name_full] = number_of(mesh)
+    session.read.vertices[mesh.name_full] = number_of(mesh)
     triangles = _triangles(mesh)
     for _ in weighed(mesh_object):
         pass
-    (_, groups, _), weights = session.weights[mesh.name_full]
+    (_, groups, _), weights = session.read.weights[mesh.name_full]
     shapes, keys = {}, mesh.shape_keys
     if keys and len(keys.key_blocks) > 1:
         basis = coordinates(keys.reference_key)
@@ -152,14 +152,14 @@ def weighed(mesh_object) -> Iterator[None]:
     """
     mesh, probe = mesh_object.data, weighed_so(mesh_object)
     name, edits, groups, rows = mesh.name_full, session.edits, len(mesh_object.vertex_groups), []
-    if name in session.weights and session.weights[name][0] == probe:
+    if name in session.read.weights and session.read.weights[name][0] == probe:
         return
     for first in range(0, len(mesh.vertices), WEIGHED):
         some = mesh.vertices[first : first + WEIGHED]
         rows += [(v.index, g.group, g.weight) for v in some for g in v.groups if g.group < groups]
         yield
     if edits == session.edits:  # otherwise they were edited in between and are read again
-        session.weights[name] = probe, np.array(rows, float).reshape(-1, 3)
+        session.read.weights[name] = probe, np.array(rows, float).reshape(-1, 3)
 
 
 def weighed_so(mesh_object) -> tuple:

@@ -15,14 +15,14 @@ def examined(armature) -> tuple[RigArrays | None, int | None, str]:
     """What `armature.read` gives, and the head that is found in it; or None twice, and why. A rig is examined again only if another head may be
     found in it: that takes longer than a redraw may.
     """
-    key, known = _found_by(armature), session.examined.get(armature.name_full)
+    key, known = _found_by(armature), session.read.examined.get(armature.name_full)
     if known is None or known[0] != key:
         try:
             rig = read(armature, armature.neuralocks_character.head_bone)
             known = key, (rig, rig.humanoid["head"], "")
         except NeuralocksError as error:
             known = key, (None, None, str(error))
-        session.examined[armature.name_full] = known
+        session.read.examined[armature.name_full] = known
     return known[1]
 
 

@@ -39,7 +39,7 @@ def follows(mesh, others) -> bool:
     read = {target.id for _, target in targets_of(data) if target.id in others} if data else set()
     if all(each in (mesh, mesh.shape_keys) or getattr(each, "data", None) == mesh for each in read):
         return False
-    return session.vertices.get(mesh.name_full) == number_of(mesh)
+    return session.read.vertices.get(mesh.name_full) == number_of(mesh)
 
 
 def _curve(curve) -> list:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a sampled motion is still what Blender shows, and sampling it again if not."""
 
+from ...sampled_rig import SampledRig
 from ...services.motion import same_pose
-from ...session import SampledRig, session
+from ...session import session
 from ..character.carried import hairs_of
 from ..character.layers import layer_of, working_in
 from ..objects.lookup import named

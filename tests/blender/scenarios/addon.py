@@ -76,7 +76,7 @@ def panel(folder: Path) -> None:
     said = " ".join(drawn())
     assert "differs from" in said and "no such" in said and "2 bones" in said, said
     for well, icon in ((True, "CHECKMARK"), (False, "ERROR")):
-        session.trained = "Hair: said", well
+        session.said.trained = "Hair: said", well
         assert drawn(icon).count("Hair: said") == 2
 
 
@@ -145,10 +145,10 @@ def told_of_what_is_there(_folder: Path) -> None:
     make_live(rig, strands)
     bpy.ops.neuralocks.report_card()
     strands.neuralocks_hair.model = "/nowhere.neuralocks"
-    assert "Hair" in messages() and "Hair" in session.cards
+    assert "Hair" in messages() and "Hair" in session.said.cards
     strands.name = "Locks"
     bpy.context.view_layer.update()
-    assert set(messages()) == {"Locks"} and not session.cards, messages()
+    assert set(messages()) == {"Locks"} and not session.said.cards, messages()
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     assert "nowhere" in messages()["Locks"]
     scene.neuralocks.hair = scenes.hair(rig, 10)
@@ -158,7 +158,7 @@ def told_of_what_is_there(_folder: Path) -> None:
     bpy.context.view_layer.update()
     assert not messages(), messages()
 
-    session.tell("Rig", NeuralocksError("Rig: a bone of it is gone"))  # as sampling in the background does
+    session.said.tell("Rig", NeuralocksError("Rig: a bone of it is gone"))  # as sampling in the background does
     rig.name = "Anna"
     bpy.context.view_layer.update()
     assert not messages(), messages()

@@ -105,7 +105,7 @@ def sampled_beside(_folder: Path) -> None:
         session.rigs["Rig"].stale = True
         while background.look() is not None:
             pass
-        assert session.sampling is None
+        assert session.sampling.done is None
 
     def broken(_context, _armature, _seconds):
         yield 1, 2
@@ -118,15 +118,15 @@ def sampled_beside(_folder: Path) -> None:
         assert again is not motion and apart(again.world(), motion.world()) < 1e-12, "in blocks of some frames"
     with patch.object(background, "in_slices", broken):
         sample()
-    assert "KeyError" in messages()["Rig"] and session.failed == {"Rig"}
+    assert "KeyError" in messages()["Rig"] and session.sampling.failed == {"Rig"}
     sample()
     assert session.rigs["Rig"].stale, "what has failed is not tried again and again"
 
     rig.scale = (-1, 1, 1)
     bpy.context.view_layer.update()
-    assert not session.failed
+    assert not session.sampling.failed
     sample()
-    assert "mirrored" in messages()["Rig"] and session.failed == {"Rig"}
+    assert "mirrored" in messages()["Rig"] and session.sampling.failed == {"Rig"}
     rig.scale = (1, 1, 1)
     bpy.context.view_layer.update()
     sample()
@@ -145,13 +145,15 @@ def sampled_beside(_folder: Path) -> None:
 
     session.rigs["Rig"].stale, scene = True, bpy.context.scene
     background.look()
-    assert session.sampling == 0.0
+    assert session.sampling.done == 0.0
     with patch.object(session, "working", "Bake to USD"):
-        assert background.look() == background.PAUSE and session.sampling == 0.0, "it steps frames beside an operator"
+        assert background.look() == background.PAUSE and session.sampling.done == 0.0, (
+            "it steps frames beside an operator"
+        )
     background.look()
-    assert session.sampling > 0.0
+    assert session.sampling.done > 0.0
     bpy.context.window.scene = bpy.data.scenes.new("Other")
-    assert background.look() is None and session.sampling is None, "nobody looks at what was sampled"
+    assert background.look() is None and session.sampling.done is None, "nobody looks at what was sampled"
     bpy.context.window.scene = scene
     sample()
     assert not messages() and not session.rigs["Rig"].stale, messages()

@@ -69,8 +69,8 @@ def _known(rig):
 def _fresh(rig):
     from dcc_addon.session import session
 
-    session.bodies.clear()
-    session.surfaces.clear()
+    session.read.bodies.clear()
+    session.read.surfaces.clear()
     return _known(rig)
 
 

@@ -89,9 +89,9 @@ def drawn_at_work(folder: Path) -> None:
     assert "24 frames" in drawn("CHECKMARK")
     session.rigs["Rig"].stale = True
     assert "Out of date" in drawn("ERROR")
-    session.sampling = 0.3
+    session.sampling.done = 0.3
     assert "Sampling 30 %" in drawn("TIME")
-    session.sampling = None
+    session.sampling.done = None
     session.preparing["Hair"] = SimpleNamespace(done=0.25, cancel=lambda: None), None
     assert "Preparing 25 %, Live cancels" in drawn()
     session.stop_preparing_all()
@@ -104,7 +104,7 @@ def drawn_at_work(folder: Path) -> None:
     strands.neuralocks_hair.live = True
     assert any("Off while Live" in line for line in drawn("INFO"))
     assert bpy.ops.neuralocks.report_card() == {"FINISHED"}
-    assert " ".join(session.cards["Hair"]) in " ".join(drawn()).replace("\u00a0", " "), session.cards
+    assert " ".join(session.said.cards["Hair"]) in " ".join(drawn()).replace("\u00a0", " "), session.said.cards
     give_bone_model(rig, folder)
     assert bpy.ops.neuralocks.find_chains() == {"FINISHED"}
     rig.neuralocks_character.rig_live = True
@@ -148,5 +148,5 @@ def drawn_at_training(_folder: Path) -> None:
         assert {"Motion error 0.25, learned", "Rig: has no neck"} < set(said), said
         assert any(f"Training {100 * done:.0f} %" in line for line in said), said
     for well, icon in ((True, "CHECKMARK"), (False, "ERROR")):
-        session.trained = "Hair: it ended", well
+        session.said.trained = "Hair: it ended", well
         assert drawn(icon).count("Hair: it ended") == 2

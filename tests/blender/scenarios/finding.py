@@ -129,5 +129,5 @@ def _sampled(skin_bone: str, chosen: str = ""):
     assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     hair.neuralocks_hair.live = True
     scene.frame_set(12)
-    assert not session.messages, session.messages
+    assert not session.said.messages, session.said.messages
     return session.rigs[rig.name_full], scenes.points(hair)

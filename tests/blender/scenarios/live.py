@@ -26,9 +26,9 @@ def sampled_first(_folder: Path) -> None:
     scene.neuralocks.armature, scene.neuralocks.hair = rig, strands
     with patch("dcc_addon.live.unsampled.bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
         strands.neuralocks_hair.live = True
-        assert session.wanting and "sampled as soon as playback stops" in messages()["Hair"], messages()
+        assert session.sampling.wanting and "sampled as soon as playback stops" in messages()["Hair"], messages()
         assert said("TIME") and not said("ERROR")
-        session.failed.add("Rig")
+        session.sampling.failed.add("Rig")
         view.refresh(scene)
         assert "press Sample Motion" in messages()["Hair"], messages()
         assert said("ERROR") and not said("TIME")
@@ -204,16 +204,18 @@ def sampled_in_turn(folder: Path) -> None:
             for _ in range(100):
                 if background.look() is None:
                     break
-                if session.sampling:  # something else is edited meanwhile
+                if session.sampling.done:  # something else is edited meanwhile
                     bpy.data.objects["Beside"].location.x += 1
                     bpy.context.view_layer.update()
         assert [call.args[1].name for call in begun.call_args_list] == ["Anna", "Ben"], (hinder, begun.call_args_list)
-        assert sorted(session.rigs) == (["Ben"] if hinder else ["Anna", "Ben"]) and session.sampling is None, hinder
+        assert sorted(session.rigs) == (["Ben"] if hinder else ["Anna", "Ben"]) and session.sampling.done is None, (
+            hinder
+        )
         assert set(messages()) == ({"Anna", "Hair of Anna"} if hinder else set()), messages()
         ben = bpy.data.objects["Hair of Ben"]
         with patch.object(background, "request") as again:
             assert apart(points_at(ben, 9), points_at(ben, 14)) > 1e-3, hinder
-            session.rigs["Ben"].stale = session.wanting = True
+            session.rigs["Ben"].stale = session.sampling.wanting = True
             background.look()
         assert not again.called, "neither what has failed, nor a frame that is shown to be sampled, begins a sampling"
 

@@ -179,16 +179,16 @@ def weighed_in_steps(_folder: Path) -> None:
         return done.index(1)
 
     assert first_frame(lambda: None) > count / 10 - 2, count
-    known = session.weights[skin.data.name_full][1]
+    known = session.read.weights[skin.data.name_full][1]
     np.testing.assert_array_equal(known, body.read(skin, rig).weights)
     assert first_frame(lambda: None) == 1  # what is known is not read again
 
     def reweigh() -> None:
         skin.vertex_groups[0].add([0], 0.25, "REPLACE")
         session.edits += 1
-        session.weights.clear()
+        session.read.weights.clear()
 
-    session.weights.clear()
+    session.read.weights.clear()
     first_frame(reweigh)
     assert 0.25 in body.read(skin, rig).weights[:, 2]
 
@@ -218,7 +218,7 @@ def posed_without_a_key(_folder: Path) -> None:
         if background.look() is None:
             break
         bpy.context.view_layer.update()
-    assert not session.rigs["Rig"].stale and session.sampling is None and abs(wide.value - 0.9) < 1e-6
+    assert not session.rigs["Rig"].stale and session.sampling.done is None and abs(wide.value - 0.9) < 1e-6
 
 
 def _begun(steps):

@@ -25,7 +25,7 @@ def pressed(folder: Path) -> None:
     assert _press("bake", "ESC") == {"CANCELLED"} and not list(folder.iterdir()) and not session.working
     for name in ("sample_motion", "bake", "report_card"):
         assert _press(name) == {"FINISHED"} and not session.working, name
-    assert out.exists() and session.cards["Hair"] and strands.neuralocks_hair.live
+    assert out.exists() and session.said.cards["Hair"] and strands.neuralocks_hair.live
     assert not messages(), messages()
 
 
@@ -38,7 +38,7 @@ def pressed_for_bones(folder: Path) -> None:
     scenes.dance(rig)
     scene.neuralocks.armature = rig
     assert _press("find_chains", "ESC") == {"CANCELLED"} and not session.rigs
-    assert _press("find_chains") == {"FINISHED"} and len(session.cards["Rig"]) == 1
+    assert _press("find_chains") == {"FINISHED"} and len(session.said.cards["Rig"]) == 1
     known = session.rigs["Rig"]
     assert _press("find_chains") == {"FINISHED"} and session.rigs["Rig"] is known
     rig.neuralocks_character.rig_model = str(scenes.rig_model(rig, folder / "rig.neuralocks"))

@@ -84,7 +84,7 @@ def trained_for_real(folder: Path) -> None:
 
     wait(follow, 400)
     print(sorted(said))
-    assert session.trained == ("Hair: trained", True)
+    assert session.said.trained == ("Hair: trained", True)
     assert len(said) > 3 and shares == sorted(shares)
     assert Path(bpy.path.abspath(strands.neuralocks_hair.model)).samefile(folder / "Hair_1.neuralocks")
     strands.neuralocks_hair.live = True

@@ -55,7 +55,7 @@ def notes_of_a_training(folder: Path) -> None:
     assert all(drawn("INFO").count(line) == 2 for line in shown), drawn("INFO")
     assert strands.neuralocks_hair.model
     _in_training(folder)
-    assert not operator.notes() and _ended() == ("Hair: trained", True) and not session.trained_notes
+    assert not operator.notes() and _ended() == ("Hair: trained", True) and not session.said.trained_notes
 
 
 def training_leaves_nothing(folder: Path) -> None:
@@ -231,4 +231,4 @@ def _ended() -> tuple[str, bool]:
     while operator.finish() is None and time.monotonic() < end:
         time.sleep(0.1)
     assert not messages(), messages()
-    return session.trained
+    return session.said.trained

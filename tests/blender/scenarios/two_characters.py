@@ -44,7 +44,7 @@ def one_deleted_while_live(folder: Path) -> None:
             rig.stale = False
         before = dict(session.rigs)
         kept = [weakref.ref(session.hairs["Hair of Anna"].hair)]
-        kept += [weakref.ref(getattr(session.written["Hair of Anna"], name)) for name in ("rest", "spare")]
+        kept += [weakref.ref(getattr(session.shown.written["Hair of Anna"], name)) for name in ("rest", "spare")]
         undoing = delete is by_menu and bpy.app.version >= (4, 0)  # without a window, older ones keep no undo steps
         if undoing:
             bpy.ops.ed.undo_push(message="before")
@@ -57,11 +57,11 @@ def one_deleted_while_live(folder: Path) -> None:
             scene.frame_set(frame)
             background.look()
         assert apart(points_at(ben, 9), shown["Hair of Ben"]) == 0.0 and not messages(), messages()
-        assert session.rigs == before and not session.rigs["Ben"].stale and not session.failed
+        assert session.rigs == before and not session.rigs["Ben"].stale and not session.sampling.failed
         if "Hair of Anna" not in bpy.data.objects:
             gc.collect()
             assert all(each() is None for each in kept), delete
-            assert session.hairs.keys() == session.written.keys() == {"Hair of Ben"}, delete
+            assert session.hairs.keys() == session.shown.written.keys() == {"Hair of Ben"}, delete
         scene.neuralocks.armature = bpy.data.objects["Anna"]
         assert not [line for line in panel.drawn("ERROR") if "Hair of" in line]
         scene.neuralocks.armature, scene.neuralocks.hair = bpy.data.objects["Ben"], ben

@@ -110,7 +110,7 @@ def misrendered(folder: Path) -> None:
             assert said.getvalue().count(told) == wrong and (told in " ".join(panel.drawn())) == wrong
             rendered = dict(got)
             if wrong:
-                assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"} and told in session.misrendered["Rig"]
+                assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"} and told in session.said.misrendered["Rig"]
             off = max(apart(points, points_at(strands, frame)) for frame, points in rendered.items())
             assert off > 1e-3 if wrong else off < 1e-6, off
     assert not messages(), messages()

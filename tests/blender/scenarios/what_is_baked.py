@@ -119,7 +119,7 @@ def told_of_a_bake(folder: Path) -> None:
         assert any(line.startswith(begin) and words in line for line in told), told
     assert not any("/Character" in line or "--" in line for line in told), told
     assert bpy.ops.neuralocks.report_card() == {"FINISHED"}
-    card = session.cards[strands.name_full]
+    card = session.said.cards[strands.name_full]
     assert any(line.startswith("前髪: 1 of 20 strands") for line in card), card
     assert not any("/Character" in line or "--" in line for line in card), card
 

@@ -90,12 +90,12 @@ def renamed_while_sampling(_folder: Path) -> None:
         before.stale = True
         for _ in range(8):
             background.look()
-        assert session.sampling
+        assert session.sampling.done
         change(strands)
         for _ in range(90):
             if background.look() is None:
                 break
-        assert session.sampling is None and not session.failed, change
+        assert session.sampling.done is None and not session.sampling.failed, change
         assert not {"Rig", "Fringe", "Beard"} & messages().keys(), messages()
         after = session.rigs["Rig"]
         assert (after is before) == (hair is None)
