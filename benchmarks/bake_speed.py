@@ -153,7 +153,7 @@ def _bake(shot, out, model, frames, plain) -> dict:
 
 def _infer(shot, out, model, frames, plain) -> dict:
     from neuralocks_core.models.runtime import StrandModel
-    from usd.baking.posing import GroomPoser
+    from usd.baking.points.posing import GroomPoser
     from usd.shot.stage import read_shot
 
     ready, loaded = read_shot(shot), StrandModel.load(model)

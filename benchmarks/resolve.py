@@ -26,7 +26,7 @@ def main() -> None:
     from neuralocks_core.deformation.resolve import Resolver
     from neuralocks_core.strands.strand_set import CLAMPED
     from usd.baking.groom_models import GroomModels
-    from usd.baking.posing import GroomPoser
+    from usd.baking.points.posing import GroomPoser
     from usd.review.demo import shipped_shot
     from usd.shot.stage import read_shot
 

@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from .scene.baked import attach
 from .scene.files.paths import absolute, beside, usual_output
 from .scene.objects.lookup import find
-from .services.overwriting import check_ours, untaken
+from .services.work.overwriting import check_ours, untaken
 
 
 def output_path(path: str) -> str:

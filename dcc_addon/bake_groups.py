@@ -9,8 +9,8 @@ from .live.blowing import blowing
 from .live.live_strands import material_words, typed
 from .live.models import load_model, model_path, named_model
 from .scene.hair import curves
-from .services.sliders import MOTION
-from .services.wind import Blowing
+from .services.hair.wind import Blowing
+from .services.panel.sliders import MOTION
 
 
 class Look(NamedTuple):

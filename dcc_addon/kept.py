@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .services.bones import LiveBones
-from .services.live import LiveHair
+from .services.hair.bones import LiveBones
+from .services.hair.live import LiveHair
 
 
 class Prepared(NamedTuple):

@@ -12,8 +12,8 @@ import numpy as np
 from neuralocks_core.character import Character
 from neuralocks_core.motion import Clip
 
-from .services.motion import Motion
-from .services.rig import BodyArrays, RigArrays
+from .services.rigs.motion import Motion
+from .services.rigs.rig import BodyArrays, RigArrays
 
 if TYPE_CHECKING:
     from .kept import Key
@@ -29,7 +29,7 @@ class SampledRig:
     character: Character
     clip: Clip
     trim: np.ndarray
-    """See `services.motion.trim_of`."""
+    """See `services.rigs.motion.trim_of`."""
     reader: PoseReader
     """Reads its pose anew."""
     key: Key
@@ -61,7 +61,7 @@ class SampledRig:
     bodies_off: tuple[str, ...]
     """Notes on what hair is kept out of elsewhere than where it is drawn, or not at all; see `scene.character.body_drawn`, `scene.character.rigid_parts`."""
     leaps: tuple[str, ...]
-    """Notes on frames at which the character jumps; see `services.leaps`."""
+    """Notes on frames at which the character jumps; see `services.rigs.leaps`."""
     hairs_off: dict[str, str]
     """Notes on hair objects, by name, that do not move with the head; see `scene.character.riding`."""
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from .services.rig import RigArrays
+from .services.rigs.rig import RigArrays
 
 if TYPE_CHECKING:
     from neuralocks_core.models.runtime import StrandModel
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .kept import Bound, Followed, Prepared, Stood, Written
     from .sampled_rig import SampledRig
     from .scene.files.save_as import Remade
-    from .services.threaded import Threaded
+    from .services.work.threaded import Threaded
 
 
 @dataclass(eq=False)

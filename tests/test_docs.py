@@ -8,7 +8,7 @@ import json
 import re
 from functools import cache
 from graphlib import TopologicalSorter
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -152,7 +152,7 @@ def test_the_map_names_modules_that_are_there():
     """`docs/architecture.md`, Where things are: whatever is code in a table names a module or a folder."""
     map_ = (ROOT / "docs/architecture.md").read_text("utf-8").split("## Where things are")[1].split("\n## ")[0]
     rows = [line for line in map_.splitlines() if line.startswith("|")]
-    named = {name.rstrip("/") for row in rows for name in re.findall(r"`([\w/]+)`", row)}
+    named = {name for row in rows for code in re.findall(r"`([\w/]+)`", row) for name in code.rstrip("/").split("/")}
     assert len(named) > 80 and named <= set(modules()), named - set(modules())
 
 
@@ -177,31 +177,43 @@ def test_every_module_is_on_the_map(package, section):
         ("neuralocks_core", "\n`neuralocks_core/`"),
         ("usd", "\n`usd/`"),
         ("dcc_addon", "\n## The Blender add-on"),
-        ("dcc_addon/scene", "\n## The Blender add-on"),
+        ("dcc_addon/services", "\n| **`services/`**"),
+        ("dcc_addon/scene", "\n| **`scene/`**"),
     ],
 )
 def test_nothing_imports_what_stands_further_down_the_map(package, table):
-    """Rows are folders, or the top-level modules that they name."""
+    """Rows are folders, or the top-level modules that they name; a folder of which other rows name parts is its own modules."""
     folder, dotted = ROOT / package, package.replace("/", ".")
     text = (ROOT / "docs/architecture.md").read_text("utf-8").split(table)[1]
+    lines = text[text.index("\n|") :].split("\n\n")[0].splitlines()[1:]
+    part = takewhile(lambda row: "**" not in row, lines) if "**" in table else lines
+    rows = [row.split("|") for row in part]
+    named = [re.findall(r"`([\w/]+)/`", where) for _, where, _, _ in rows]
+    parted = {name.split("/")[0] for names in named for name in names if "/" in name}
     order = []
-    for _, where, what, _ in (row.split("|") for row in text[text.index("\n|") :].split("\n\n")[0].splitlines()[1:]):
-        folders = [name for name in re.findall(r"`(\w+)/`", where) if (folder / name).is_dir()]
+    for names, (_, _, what, _) in zip(named, rows, strict=True):
+        folders = [name for name in names if (folder / name).is_dir()]
         alone = [name for name in re.findall(r"`(\w+)`", what) if (folder / f"{name}.py").exists()]
         if folders:
-            order.append({name: sorted((folder / name).rglob("*.py")) for name in folders})
+            below = {name: "*.py" if name in parted else "**/*.py" for name in folders}
+            order.append([path for name, files in below.items() for path in sorted((folder / name).glob(files))])
         elif alone:
-            order.append({name: [folder / f"{name}.py"] for name in alone})
-    named = {name for row in order for name in row}
-    assert named >= {path.parent.name for path in folder.glob("*/__init__.py")}
+            order.append([folder / f"{name}.py" for name in alone])
+    there = {path for part in folder.glob("*/__init__.py") for path in part.parent.rglob("*.py")}
+    assert {path for row in order for path in row} >= there
     for place, row in enumerate(order):
-        below = {f"{dotted}.{name}" for later in order[place + 1 :] for name in later}
-        for path in sum(row.values(), []):
-            assert not imported(path, dotted.count(".") + 2) & below, path
+        below = {dotted_name(path) for later in order[place + 1 :] for path in later}
+        for path in row:
+            assert not imported(path) & below, path
 
 
-def imported(path: Path, parts: int) -> set[str]:
-    """What a module imports, wherever in it, by its first parts: `package.folder`, for two. Types in annotations do not count."""
+def dotted_name(path: Path) -> str:
+    """A module as it is imported."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def imported(path: Path) -> set[str]:
+    """What a module imports, wherever in it: modules, and names in them. Types in annotations do not count."""
     tree = ast.parse(path.read_text("utf-8"))
     typed = {
         id(each)
@@ -214,7 +226,7 @@ def imported(path: Path, parts: int) -> set[str]:
         if isinstance(node, ast.ImportFrom) and id(node) not in typed:
             above = path.relative_to(ROOT).parts[: -node.level] if node.level else ()
             base = [*above, *(node.module.split(".") if node.module else [])]
-            found |= {".".join([*base, each.name][:parts]) for each in node.names}
+            found |= {".".join(base), *(".".join([*base, each.name]) for each in node.names)}
     return found
 
 

@@ -5,8 +5,8 @@ import blf
 import bpy
 
 from ..live.unsampled import FIRST
-from ..services.panel_errors import for_the_panel
-from ..services.wrapping import wrapped
+from ..services.panel.panel_errors import for_the_panel
+from ..services.panel.wrapping import wrapped
 from ..session import session
 
 MARGINS, ICON = 70, 25

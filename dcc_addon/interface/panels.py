@@ -15,10 +15,10 @@ from ..scene.hair import imported
 from ..scene.keys import hair_keys
 from ..scene.motion.sampled_from import begins_later, frames_of
 from ..scene.particles import waiting
-from ..services.panel_errors import for_the_panel
-from ..services.remaining import in_words
-from ..services.rig import advice
-from ..services.sliders import SLIDERS
+from ..services.panel.panel_errors import for_the_panel
+from ..services.panel.remaining import in_words
+from ..services.panel.sliders import SLIDERS
+from ..services.rigs.rig import advice
 from ..session import session
 from .hair_notes import hair_notes, unnamed_model
 from .labels import hint, message, progress, words

@@ -12,7 +12,7 @@ from .. import background
 from ..live import view
 from ..scene.files import named_from
 from ..scene.files.paths import FILE
-from ..services.sliders import SLIDERS
+from ..services.panel.sliders import SLIDERS
 from ..session import session
 
 OVERRIDABLE = {"override": {"LIBRARY_OVERRIDABLE"}}

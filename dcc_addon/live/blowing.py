@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The wind that blows on a character's hair, strands and bones alike, read from its settings."""
 
-from ..services.wind import Blowing
+from ..services.hair.wind import Blowing
 
 
 def blowing(armature) -> Blowing:

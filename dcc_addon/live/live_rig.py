@@ -7,7 +7,7 @@ from neuralocks_core.rig import RigModel
 from ..kept import Bound
 from ..scene.drawing.clock import shown_frame
 from ..scene.keys import rotations
-from ..services.bones import LiveBones
+from ..services.hair.bones import LiveBones
 from ..session import session
 from .blowing import blowing
 from .models import model_path, stamp

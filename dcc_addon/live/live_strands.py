@@ -24,11 +24,11 @@ from ..scene.hair import curves
 from ..scene.hair.muting import mute_deformers, unmute_deformers
 from ..scene.objects.lively import lively
 from ..scene.objects.lookup import find, identity, in_scene
-from ..services import rig as rig_service
-from ..services.axes import to_core
-from ..services.live import LiveHair
-from ..services.motion import TOLERANCE
-from ..services.sliders import MATERIAL, MOTION
+from ..services.hair.live import LiveHair
+from ..services.panel.sliders import MATERIAL, MOTION
+from ..services.rigs import rig as rig_service
+from ..services.rigs.axes import to_core
+from ..services.rigs.motion import TOLERANCE
 from ..session import session
 from . import edited, joined, preparing
 from .blowing import blowing

@@ -10,8 +10,8 @@ from ..scene.drawing.clock import shown_frame
 from ..scene.drawing.last_called import others_called
 from ..scene.keys.hair_keys import as_before
 from ..scene.motion.sampled_from import timing_of
-from ..services.axes import to_core
-from ..services.motion import as_carried, same_pose
+from ..services.rigs.axes import to_core
+from ..services.rigs.motion import as_carried, same_pose
 from ..session import session
 
 

@@ -4,7 +4,7 @@
 import bpy
 
 from ..scene.drawing.redraw import redraw
-from ..services.threaded import Threaded
+from ..services.work.threaded import Threaded
 from ..session import session
 
 LOOK = 0.05

@@ -23,12 +23,12 @@ from ..scene.files.paths import check_own
 from ..scene.hair import imported
 from ..scene.hair.muting import on_top
 from ..scene.objects.lookup import named
-from ..services.names import file_label
-from ..services.overwriting import untaken
-from ..services.panel_errors import for_the_panel
-from ..services.temporary import temporary_folder
-from ..services.threaded import Threaded, loading
-from ..services.unfinished import undone_on_failure
+from ..services.panel.panel_errors import for_the_panel
+from ..services.rigs.names import file_label
+from ..services.work.overwriting import untaken
+from ..services.work.temporary import temporary_folder
+from ..services.work.threaded import Threaded, loading
+from ..services.work.unfinished import undone_on_failure
 from ..session import session
 from .base import FILE_ONCE, Stepwise, sampling, shown_armature, shown_hair, tell
 
@@ -213,7 +213,7 @@ class NEURALOCKS_OT_report(Stepwise, bpy.types.Operator):
 
 def _card(path: str, prims: dict[str, str]):
     """Steps of measuring a bake of the objects with these prims, by name; returns the lines of its card."""
-    from ..services.card import lines_of
+    from ..services.panel.card import lines_of
 
     yield from loading("usd.review.evaluate")
     from usd.review.evaluate import evaluate

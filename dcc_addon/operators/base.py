@@ -16,8 +16,8 @@ from ..scene.files.paths import FILE, check_found
 from ..scene.motion.sampling import in_slices
 from ..scene.motion.up_to_date import known
 from ..scene.objects.lookup import in_scene
-from ..services.panel_errors import for_the_panel
-from ..services.remaining import in_words
+from ..services.panel.panel_errors import for_the_panel
+from ..services.panel.remaining import in_words
 from ..session import session
 
 SLICE = 0.06

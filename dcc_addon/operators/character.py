@@ -12,7 +12,7 @@ from ..scene.character.body import find, left_behind
 from ..scene.character.carried import bodies_of
 from ..scene.files.paths import check_own
 from ..scene.objects.instances import check_real
-from ..services import rig as rig_service
+from ..services.rigs import rig as rig_service
 from .base import Hardened, Stepwise, sampling, shown_armature
 
 

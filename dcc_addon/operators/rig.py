@@ -20,13 +20,13 @@ from ..scene.export import write_shot
 from ..scene.files.paths import absolute, check_own
 from ..scene.keys import hair_keys
 from ..scene.objects.lookup import named
-from ..services.bones import LiveBones, chains_of, own_turns
-from ..services.motion import frame_numbers
-from ..services.names import file_label
-from ..services.overwriting import check_ours, untaken
-from ..services.panel_errors import for_the_panel
-from ..services.threaded import Threaded, loading
-from ..services.unfinished import undone_on_failure
+from ..services.hair.bones import LiveBones, chains_of, own_turns
+from ..services.panel.panel_errors import for_the_panel
+from ..services.rigs.motion import frame_numbers
+from ..services.rigs.names import file_label
+from ..services.work.overwriting import check_ours, untaken
+from ..services.work.threaded import Threaded, loading
+from ..services.work.unfinished import undone_on_failure
 from ..session import session
 from .bake import frame_range
 from .base import FILE_ONCE, Hardened, Stepwise, sampled_once, sampling, shown_armature, tell

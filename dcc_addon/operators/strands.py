@@ -10,8 +10,8 @@ from ..scene import particles
 from ..scene.character.binding import carrier
 from ..scene.files.paths import check_own
 from ..scene.hair import imported
-from ..services.sliders import SLIDERS
-from ..services.threaded import loading
+from ..services.panel.sliders import SLIDERS
+from ..services.work.threaded import loading
 from ..session import session
 from .base import ONCE, Hardened, Stepwise, shown_armature, shown_hair
 
@@ -79,7 +79,7 @@ class NEURALOCKS_OT_rest_from_file(Stepwise, bpy.types.Operator):
     bl_label = "Rest Shape from File"
 
     def steps(self, context):
-        yield from loading("usd.shot.imported")
+        yield from loading("usd.shot.strands.imported")
         hair = shown_hair(context)
         check_own(hair)
         path = imported.take_rest(hair)

@@ -20,12 +20,12 @@ from ..scene.files.paths import MODELS, check_own, library_of
 from ..scene.files.save_as import named_here, set_path
 from ..scene.hair import curves
 from ..scene.objects.lookup import find, identified, identity, named
-from ..services.names import file_label
-from ..services.panel_errors import for_the_panel
-from ..services.temporary import temporary_folder
-from ..services.threaded import Threaded, loading
-from ..services.trainers import Trainers
-from ..services.training_job import TrainingJob, default_python, installing
+from ..services.panel.panel_errors import for_the_panel
+from ..services.rigs.names import file_label
+from ..services.training.trainers import Trainers
+from ..services.training.training_job import TrainingJob, default_python, installing
+from ..services.work.temporary import temporary_folder
+from ..services.work.threaded import Threaded, loading
 from ..session import session
 from .base import ONCE, Hardened, Stepwise, sampling, shown_armature, shown_hair
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from neuralocks_core.rotation import relative_to_parents
 
-from ..services import names
-from ..services.axes import to_core
-from ..services.rig import joint_weights, shape_names, skin
-from ..services.threaded import Threaded
+from ..services.rigs import names
+from ..services.rigs.axes import to_core
+from ..services.rigs.rig import joint_weights, shape_names, skin
+from ..services.work.threaded import Threaded
 from .files.paths import beside
 from .hair import curves
 

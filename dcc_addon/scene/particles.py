@@ -10,7 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.rotation import flat
 
-from ..services.widths import radii
+from ..services.hair.widths import radii
 from .character.armature import matrix
 from .character.binding import at_rest
 from .drawing.shown import homes_of

@@ -42,7 +42,7 @@ def test_zips_hold_what_blender_expects(tmp_path):
         listed = set(made.namelist())
     assert manifest["platforms"] == ["linux-x64"] and manifest["permissions"]
     assert all(w.removeprefix("./") in listed for w in manifest["wheels"])
-    assert {"__init__.py", "LICENSE", "services/live.py"} <= listed
+    assert {"__init__.py", "LICENSE", "services/hair/live.py"} <= listed
     assert not any("build.py" in n or "__pycache__" in n for n in listed)
     with zipfile.ZipFile(build.legacy(tmp_path, [wheel])) as made:
         listed = made.namelist()

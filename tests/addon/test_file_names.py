@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How files are named that the panel writes unasked."""
 
-from dcc_addon.services.names import LONGEST, file_label
-from dcc_addon.services.overwriting import untaken
+from dcc_addon.services.rigs.names import LONGEST, file_label
+from dcc_addon.services.work.overwriting import untaken
 
 
 def test_labels_keep_letters_of_all_scripts():

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from dcc_addon.services import bones, widths
-from dcc_addon.services.history import SampledBoundary
-from dcc_addon.services.live import LiveHair
+from dcc_addon.services.hair import bones, widths
+from dcc_addon.services.hair.history import SampledBoundary
+from dcc_addon.services.hair.live import LiveHair
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom

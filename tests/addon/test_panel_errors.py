@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dcc_addon.services.panel_errors import WORDS, for_the_panel
+from dcc_addon.services.panel.panel_errors import WORDS, for_the_panel
 from neuralocks_core.models.model_file import REMEDIES
 
 ROOT = Path(__file__).resolve().parents[2]

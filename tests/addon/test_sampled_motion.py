@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dcc_addon.services import following, rig
-from dcc_addon.services.history import SampledBoundary
-from dcc_addon.services.leaps import leaps_told
-from dcc_addon.services.motion import Motion, frame_numbers, similar
+from dcc_addon.services.hair.history import SampledBoundary
+from dcc_addon.services.rigs import following, rig
+from dcc_addon.services.rigs.leaps import leaps_told
+from dcc_addon.services.rigs.motion import Motion, frame_numbers, similar
 from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.boundary.history import BoundarySampler
 from neuralocks_core.boundary.spec import BoundarySpec

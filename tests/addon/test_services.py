@@ -6,9 +6,11 @@ import pytest
 import trimesh
 from pxr import Sdf
 
-from dcc_addon.services import axes, bones, card, names, panel_errors, rig
-from dcc_addon.services.mirror import mirrored
-from dcc_addon.services.remaining import in_words
+from dcc_addon.services.hair import bones
+from dcc_addon.services.panel import card, panel_errors
+from dcc_addon.services.panel.remaining import in_words
+from dcc_addon.services.rigs import axes, names, rig
+from dcc_addon.services.rigs.mirror import mirrored
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.evaluation.report import Card

@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import pytest
 
-from dcc_addon.services.sliders import MATERIAL, SLIDERS
+from dcc_addon.services.panel.sliders import MATERIAL, SLIDERS
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 

@@ -8,7 +8,7 @@ import weakref
 
 import pytest
 
-from dcc_addon.services.threaded import Threaded
+from dcc_addon.services.work.threaded import Threaded
 
 
 class _Stage:

@@ -3,7 +3,7 @@
 
 import time
 
-from dcc_addon.services import trainers
+from dcc_addon.services.training import trainers
 
 
 def _answered(asked: trainers.Trainers, python: str = "python") -> str | None:

@@ -9,7 +9,7 @@ from unittest.mock import create_autospec
 
 import pytest
 
-from dcc_addon.services import training_child
+from dcc_addon.services.training import training_child
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.training.work import folder_beside
 

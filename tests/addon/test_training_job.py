@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 import neuralocks_core
-from dcc_addon.services import training_check, training_job
+from dcc_addon.services.training import training_check, training_job
 from neuralocks_core import time_left
 from neuralocks_core.errors import NeuralocksError
 

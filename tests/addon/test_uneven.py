@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from dcc_addon.services.hidden import unhidden
-from dcc_addon.services.motion import Motion
-from dcc_addon.services.rig import RigArrays
+from dcc_addon.services.rigs.hidden import unhidden
+from dcc_addon.services.rigs.motion import Motion
+from dcc_addon.services.rigs.rig import RigArrays
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import from_vector
 

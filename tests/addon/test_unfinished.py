@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dcc_addon.services.unfinished import undone_on_failure
+from dcc_addon.services.work.unfinished import undone_on_failure
 from neuralocks_core.errors import NeuralocksError
 
 

@@ -3,7 +3,7 @@
 
 import pytest
 
-from dcc_addon.services.wrapping import wrapped
+from dcc_addon.services.panel.wrapping import wrapped
 
 
 def measure(text: str) -> float:

@@ -92,7 +92,7 @@ def baked_points(path, prim, frame):
 
 def body_sampled(rig, body) -> int:
     """Compares the body of the sampled character with the evaluated mesh; its number of vertices."""
-    from dcc_addon.services.axes import to_core
+    from dcc_addon.services.rigs.axes import to_core
     from dcc_addon.session import session
     from neuralocks_core.rotation import transformed
 

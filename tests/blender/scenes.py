@@ -200,7 +200,7 @@ def fcurves_of(action) -> list:
 
 def rig_model(rig, path):
     """A model of random weights for the hair bones of a rig; its graph, for which onnx is needed, is never read."""
-    from dcc_addon.services.bones import chains_of
+    from dcc_addon.services.hair.bones import chains_of
     from dcc_addon.session import session
     from neuralocks_core.rig import rig_spec
     from tests.rig_models import random_rig_model

@@ -13,7 +13,7 @@ from usd.assets.grow import grow
 from usd.assets.importing import import_groom
 from usd.baking.bake import bake
 from usd.baking.join import join
-from usd.baking.spool import Spool
+from usd.baking.layer.spool import Spool
 from usd.models.train import train
 from usd.review.demo import demo
 from usd.review.evaluate import evaluate

@@ -11,11 +11,11 @@ from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.strand_set import root_uv
 
-from ..baking.header import RANGE, write_header
+from ..baking.layer.header import RANGE, write_header
 from ..border.arrays import floats, integers, row_matrix
 from ..border.stage_files import write_stage
-from ..shot.curve_ends import Beyond
-from ..shot.curves import find_curves
+from ..shot.strands.curve_ends import Beyond
+from ..shot.strands.curves import find_curves
 from ..skel.stage_rig import StageRig
 from .beside import Beside
 from .prims import POLYLINES, Spline, author_curves

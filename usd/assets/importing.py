@@ -16,7 +16,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles.fitting import sized
 from neuralocks_core.progress import Progress, silent, within
 
-from ..baking.undrawn_points import UndrawnPoints
+from ..baking.points.undrawn_points import UndrawnPoints
 from ..border.stage_files import OTHERS, USD, check_layer_name
 from ..skel.stage_rig import StageRig
 from .beside import Beside, Primvar

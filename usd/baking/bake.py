@@ -17,12 +17,12 @@ from neuralocks_core.wind import check_felt
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
-from ..shot.recorded import given_facts
+from ..shot.bakes.recorded import given_facts
 from ..shot.stage import StageGroom
 from ..shot.wind import as_wind, in_core, wind_facts
 from .groom_models import GroomModels
 from .model_notes import learned, model_notes
-from .posing import GroomPoser
+from .points.posing import GroomPoser
 from .procedure import BakeResult, known_notes, read_asked, write_told
 from .samples import write_samples
 

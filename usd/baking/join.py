@@ -17,15 +17,15 @@ from neuralocks_core.progress import Progress, silent
 from ..border.damage import first_line, named
 from ..border.stage_files import LAYERS, check_file, check_layer_name, check_not_over, one_file, open_stage
 from ..border.units import Border
-from ..shot.gaps import gaps, some, thinned
+from ..shot.bakes.gaps import gaps, some, thinned
+from ..shot.bakes.recorded import KEY
 from ..shot.made_from import INPUTS, unlike
-from ..shot.notes import composition_notes, few, out_of_place
-from ..shot.recorded import KEY
+from ..shot.telling.notes import composition_notes, few, out_of_place
 from ..skel.rig_copy import SOURCE
-from .header import relative, repeat_metadata
-from .override import deliver
-from .sample_layer import SampleLayer, in_order
-from .spool import Spool, fingerprint
+from .layer.header import relative, repeat_metadata
+from .layer.override import deliver
+from .layer.sample_layer import SampleLayer, in_order
+from .layer.spool import Spool, fingerprint
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from neuralocks_core.materials import Material
 from neuralocks_core.models.model_file import shipped, specialists
 from neuralocks_core.models.runtime import StrandModel
 
-from ..shot.attach import Attachment
-from ..shot.character_notes import untrained
-from ..shot.notes import without_strength
+from ..shot.carriers.attach import Attachment
+from ..shot.telling.character_notes import untrained
+from ..shot.telling.notes import without_strength
 
 
 def model_notes(

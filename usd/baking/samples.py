@@ -28,12 +28,12 @@ from ..border.stopping import stopped
 from ..shot.stage import Shot, StageGroom
 from .batches import batches
 from .frame_uses import Uses
-from .header import write_header
-from .override import OverrideWriter, deliver
-from .sample_layer import SAVE_EVERY, SampleLayer
-from .spool import Spool, fingerprint, program_files, unsaved_digest
+from .layer.header import write_header
+from .layer.override import OverrideWriter, deliver
+from .layer.sample_layer import SAVE_EVERY, SampleLayer
+from .layer.spool import Spool, fingerprint, program_files, unsaved_digest
+from .layer.write_behind import WriteBehind
 from .stencils import Stencils
-from .write_behind import WriteBehind
 
 BLOCK = 1 << 16
 """Points that are read back and written at a time."""

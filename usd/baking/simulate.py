@@ -22,11 +22,11 @@ from neuralocks_core.warp_device import start_warp
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
-from ..shot.recorded import given_facts
+from ..shot.bakes.recorded import given_facts
 from ..shot.stage import StageGroom
 from ..shot.wind import as_wind, in_core, wind_facts
 from .bake import as_material
-from .placing import GroomPlacer
+from .points.placing import GroomPlacer
 from .procedure import BakeResult, known_notes, read_asked, write_told
 from .samples import write_samples
 from .stencils import Stencils

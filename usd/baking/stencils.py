@@ -5,7 +5,7 @@ import numpy as np
 
 from ..border.time_codes import NEAR, on_frame
 from ..shot.stage import StageGroom
-from .sample_layer import in_order
+from .layer.sample_layer import in_order
 
 
 class Stencils:

@@ -143,7 +143,7 @@ def simulate_command(
 
 def _how_to_go_on(out: Path) -> list[str]:
     """How to resume: nobody would look for samples in a hidden folder."""
-    from ..baking.spool import kept
+    from ..baking.layer.spool import kept
 
     samples = kept(out)
     return [f"the same command continues from here, with {counted(samples, 'sample')} done"] if samples else []

@@ -20,10 +20,10 @@ from ..border.damage import names_damage
 from ..border.stage_files import open_stage
 from ..border.units import Border
 from ..border.values import as_names
-from ..shot.lacking import nothing_found
-from ..shot.motion_notes import motion_notes
-from ..shot.notes import without_turn
-from ..shot.skeletons import read_each_rig
+from ..shot.characters.skeletons import read_each_rig
+from ..shot.telling.lacking import nothing_found
+from ..shot.telling.motion_notes import motion_notes
+from ..shot.telling.notes import without_turn
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 

@@ -18,7 +18,7 @@ from neuralocks_core.models.network_sizes import HIDDEN, SHAPE, K
 from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.rotation import rotation_part, sizes
 
-from ..baking.placing import GroomPlacer
+from ..baking.points.placing import GroomPlacer
 from ..shot.stage import StageGroom
 
 ARRAYS = {

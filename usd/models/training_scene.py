@@ -21,14 +21,14 @@ from ..assets.grow import Barber
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import check_file, open_stage
-from ..shot.alike import one_person
-from ..shot.attach import attach, of_another
-from ..shot.curve_ends import groom_between
-from ..shot.curves import find_curves, without_points
-from ..shot.notes import few, first_of, unfound, unlikely_head
-from ..shot.rig_controls import open_curves
-from ..shot.skeletons import read_each_rig
+from ..shot.carriers.alike import one_person
+from ..shot.carriers.attach import attach, of_another
+from ..shot.characters.skeletons import read_each_rig
+from ..shot.search.rig_controls import open_curves
 from ..shot.stage import read_rigs
+from ..shot.strands.curve_ends import groom_between
+from ..shot.strands.curves import find_curves, without_points
+from ..shot.telling.notes import few, first_of, unfound, unlikely_head
 from ..skel.binding import bound_skeleton
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig

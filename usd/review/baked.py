@@ -13,10 +13,10 @@ from neuralocks_core.preview.film import Scene
 from neuralocks_core.rotation import transformed
 
 from ..border.values import as_numbers
-from ..shot.alike import one_person
-from ..shot.gaps import gaps, some
+from ..shot.bakes.gaps import gaps, some
+from ..shot.bakes.recorded import recorded_cuts, recorded_joint, retimed
+from ..shot.carriers.alike import one_person
 from ..shot.made_from import baked_from_others
-from ..shot.recorded import recorded_cuts, recorded_joint, retimed
 from ..shot.stage import Shot, StageGroom, read_shot
 from ..skel.stage_rig import StageRig
 from ..skel.surface import drawn

@@ -19,14 +19,14 @@ from ..baking.model_notes import model_notes
 from ..border.placement import Placement
 from ..border.units import Border
 from ..border.values import as_numbers
-from ..shot.curve_ends import groom_between, undrawn
-from ..shot.curves import rest_counts
-from ..shot.gaps import gaps
-from ..shot.groom_notes import groom_notes
-from ..shot.hair_search import HairSearch
+from ..shot.bakes.gaps import gaps
+from ..shot.bakes.recorded import recorded, retimed
+from ..shot.characters.whole_body import WholeBodies
 from ..shot.made_from import baked_from_others
-from ..shot.recorded import recorded, retimed
-from ..shot.whole_body import WholeBodies
+from ..shot.search.hair_search import HairSearch
+from ..shot.strands.curve_ends import groom_between, undrawn
+from ..shot.strands.curves import rest_counts
+from ..shot.telling.groom_notes import groom_notes
 
 
 def facts_of_grooms(

@@ -20,12 +20,16 @@ from ..rig.notes import RIG_JOINTS, mirrored_notes, offset_notes
 from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import check_authored, check_orients, core_meshes, describe_chains, is_baked, of_bake
 from ..rig.uneven import names_uneven_prims
-from ..shot.character_notes import lies_down, untrained, weight_notes, without_body
-from ..shot.curves import find_curves
-from ..shot.hair_search import HairSearch
-from ..shot.lacking import no_groom, no_skeleton
-from ..shot.motion_notes import motion_notes
-from ..shot.notes import (
+from ..shot.bakes.recorded import recorded, recorded_cuts
+from ..shot.characters.skeletons import read_each_rig
+from ..shot.characters.whole_body import WholeBodies
+from ..shot.search.hair_search import HairSearch
+from ..shot.stage import frame_range
+from ..shot.strands.curves import find_curves
+from ..shot.telling.character_notes import lies_down, untrained, weight_notes, without_body
+from ..shot.telling.lacking import no_groom, no_skeleton
+from ..shot.telling.motion_notes import motion_notes
+from ..shot.telling.notes import (
     another_head,
     composition_notes,
     few,
@@ -37,10 +41,6 @@ from ..shot.notes import (
     rig_notes,
     without_turn,
 )
-from ..shot.recorded import recorded, recorded_cuts
-from ..shot.skeletons import read_each_rig
-from ..shot.stage import frame_range
-from ..shot.whole_body import WholeBodies
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .groom_facts import facts_of_grooms, groom_facts

@@ -22,8 +22,8 @@ from ..border.time_codes import parse_frames, time_codes
 from ..border.units import Border
 from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
-from ..shot.curves import find_curves
-from ..shot.notes import few
+from ..shot.strands.curves import find_curves
+from ..shot.telling.notes import few
 from .baked import MOST_BODY_POINTS, Baked, read_baked
 
 SIDES = 16, 4096

@@ -20,9 +20,9 @@ from ..border.damage import names_damage
 from ..border.stage_files import check_layer_name, check_not_over
 from ..border.stopping import check
 from ..border.time_codes import given_cuts
-from ..shot.also_changed import also_changed
-from ..shot.notes import asked_notes, left_out, out_of_place, without_strength
+from ..shot.bakes.also_changed import also_changed
 from ..shot.stage import check_cuts
+from ..shot.telling.notes import asked_notes, left_out, out_of_place, without_strength
 from ..shot.wind import as_wind, in_core, wind_facts
 from ..skel.source import find_skeletons
 from .bound import BoundHair

@@ -13,10 +13,10 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import atomic_write
 from neuralocks_core.rotation import quaternion_product, relative_to_parents, rotation_part, to_quaternion
 
-from ..baking.header import apply_binding, over_prim, write_header
+from ..baking.layer.header import apply_binding, over_prim, write_header
 from ..border.damage import named
 from ..border.stage_files import refresh_open
-from ..shot.recorded import record
+from ..shot.bakes.recorded import record
 from ..skel.joints import JointSource
 from ..skel.rig_copy import hair_of, tell_source
 from .stage import BAKED, RiggedHair

@@ -8,8 +8,8 @@ from neuralocks_core.rig.carried import moved_between
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import rig_spec
 
-from ..shot.character_notes import lies_down, weight_notes
-from ..shot.notes import another_head, unfound, unlikely_head
+from ..shot.telling.character_notes import lies_down, weight_notes
+from ..shot.telling.notes import another_head, unfound, unlikely_head
 from ..skel.stage_rig import StageRig
 from .facing import askew_notes
 from .outside import left_out_notes, outside_notes

@@ -11,7 +11,7 @@ from neuralocks_core.rig.parting import parted
 from neuralocks_core.rig.rigging import moving_joints
 from neuralocks_core.rotation import transformed
 
-from ..shot.whole_body import with_parts
+from ..shot.characters.whole_body import with_parts
 from .stage import RiggedHair, core_meshes
 
 

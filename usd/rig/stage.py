@@ -26,10 +26,10 @@ from ..border.stage_files import open_stage
 from ..border.stopping import check
 from ..border.units import Border
 from ..border.values import as_names
-from ..shot.lacking import has_hair_joints, nothing_found
-from ..shot.notes import partial_body
-from ..shot.others import Others
-from ..shot.whole_body import parts_elsewhere, with_parts
+from ..shot.characters.others import Others
+from ..shot.characters.whole_body import parts_elsewhere, with_parts
+from ..shot.telling.lacking import has_hair_joints, nothing_found
+from ..shot.telling.notes import partial_body
 from ..skel.source import find_skeletons, read_rig
 from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins

@@ -7,8 +7,8 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.groom import Groom
 from neuralocks_core.sketch import alike, sketch
 
-from .attach import Attachment
-from .recorded import recorded, recorded_joint, seen_as_written
+from .bakes.recorded import recorded, recorded_joint, seen_as_written
+from .carriers.attach import Attachment
 
 INPUTS = "inputs"
 """Key of what `made_from` gives, in the record of a bake."""

@@ -20,14 +20,17 @@ from ..border.units import Border
 from ..skel.cut_samples import within
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
-from .attach import Attachment
-from .character_notes import lies_down, untrained, weight_notes, without_body
-from .curve_ends import Beyond, groom_between
-from .curves import find_curves
-from .groom_notes import groom_notes, stands_still
-from .hair_search import HairSearch
-from .lacking import no_groom, no_skeleton
-from .notes import (
+from .carriers.attach import Attachment
+from .characters.others import Others
+from .characters.skeletons import read_each_rig
+from .characters.whole_body import WholeBodies, whole_body
+from .search.hair_search import HairSearch
+from .strands.curve_ends import Beyond, groom_between
+from .strands.curves import find_curves
+from .telling.character_notes import lies_down, untrained, weight_notes, without_body
+from .telling.groom_notes import groom_notes, stands_still
+from .telling.lacking import no_groom, no_skeleton
+from .telling.notes import (
     composition_notes,
     few,
     layer_notes,
@@ -37,9 +40,6 @@ from .notes import (
     rig_notes,
     without_turn,
 )
-from .others import Others
-from .skeletons import read_each_rig
-from .whole_body import WholeBodies, whole_body
 
 
 @dataclass(frozen=True)

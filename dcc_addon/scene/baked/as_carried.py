@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What moves hair, strands and bones alike: what a character is set to, and a model, as numbers of a record; see `recorded`."""
 
-from ...services.wind import Blowing
+from ...services.hair.wind import Blowing
 from ..character.examined import examined
 from ..files.paths import MODELS, full, library_of
 from ..objects.recorded import number_of

@@ -5,7 +5,7 @@ kept out of. A cache goes on showing these as they were.
 
 import zlib
 
-from ...services.sliders import SLIDERS
+from ...services.panel.sliders import SLIDERS
 from ...session import session
 from ..hair.curves import points
 from ..motion.rigging import hangs, stands

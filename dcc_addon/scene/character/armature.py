@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from ...services import names
-from ...services.rig import RigArrays
+from ...services.rigs import names
+from ...services.rigs.rig import RigArrays
 from ..files.paths import check_found
 from .skinned import bones_with_skin
 

@@ -11,8 +11,8 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse
 
-from ...services.mirror import mirrored
-from ...services.rig import BodyArrays
+from ...services.rigs.mirror import mirrored
+from ...services.rigs.rig import BodyArrays
 from ...session import session
 from ..drawing.shown import in_renders
 from .armature import matrix

@@ -7,7 +7,7 @@ import numpy as np
 
 from neuralocks_core.rotation import transformed
 
-from ...services.axes import to_core
+from ...services.rigs.axes import to_core
 from ..drawing.watched import evaluated_for_itself
 from ..objects.lookup import find
 from .armature import matrix

@@ -5,7 +5,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 
-from ...services.rig import RigArrays
+from ...services.rigs.rig import RigArrays
 from ...session import session
 from .armature import read
 from .skinned import groups_of_skin

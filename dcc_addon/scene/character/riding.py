@@ -9,8 +9,8 @@ import numpy as np
 
 from neuralocks_core.anatomy.hierarchy import ancestors, below
 
-from ...services import following
-from ...services import rig as rig_service
+from ...services.rigs import following
+from ...services.rigs import rig as rig_service
 from ..hair import curves
 from ..keys.hair_keys import as_before
 from .binding import carrying_bone

@@ -12,7 +12,7 @@ from neuralocks_core import rest_copy
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import transformed
 
-from ...services.rig import check_strands
+from ...services.rigs.rig import check_strands
 from . import unbound
 from .nodes import geometry_nodes
 

@@ -42,7 +42,7 @@ def take_rest(hair) -> str:
     Raises:
         NeuralocksError: it has another shape, or the file has no rest shape of it.
     """
-    from usd.shot.imported import imported_and_rest
+    from usd.shot.strands.imported import imported_and_rest
 
     if not has_file(hair):
         raise NeuralocksError(f"{hair.name_full}: no modifier of it names a USD file that it was imported from")

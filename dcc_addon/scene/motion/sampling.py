@@ -13,12 +13,12 @@ from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.motion import Clip
 
 from ...sampled_rig import SampledRig
-from ...services import following
-from ...services import rig as rig_service
-from ...services.axes import to_core
-from ...services.hidden import check_placed, unhidden
-from ...services.leaps import leaps_told
-from ...services.motion import Motion, frame_numbers, trim_of
+from ...services.rigs import following
+from ...services.rigs import rig as rig_service
+from ...services.rigs.axes import to_core
+from ...services.rigs.hidden import check_placed, unhidden
+from ...services.rigs.leaps import leaps_told
+from ...services.rigs.motion import Motion, frame_numbers, trim_of
 from ...session import session
 from ..character import armature as armature_reader
 from ..character import body as body_reader

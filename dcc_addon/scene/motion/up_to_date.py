@@ -2,7 +2,7 @@
 """Whether a sampled motion is still what Blender shows, and sampling it again if not."""
 
 from ...sampled_rig import SampledRig
-from ...services.motion import same_pose
+from ...services.rigs.motion import same_pose
 from ...session import session
 from ..character.carried import hairs_of
 from ..character.layers import layer_of, working_in

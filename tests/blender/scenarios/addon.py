@@ -205,7 +205,7 @@ def remedy_in_full(_folder: Path) -> None:
 def command_is_copied(_folder: Path) -> None:
     """Typed from the panel, where it is wrapped into lines, it would come out wrong."""
     from dcc_addon.operators.training import NEURALOCKS_OT_copy_install
-    from dcc_addon.services.training_job import installing
+    from dcc_addon.services.training.training_job import installing
 
     context = MagicMock()
     message = NEURALOCKS_OT_copy_install.work(SimpleNamespace(), context)

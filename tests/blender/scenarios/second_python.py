@@ -16,7 +16,7 @@ from tests.blender.checks import messages
 def remedy_followed(folder: Path) -> None:
     """The panel notices automatically that a Python that could not train now has what it lacked."""
     from dcc_addon.operators import training as operator
-    from dcc_addon.services import trainers, training_job
+    from dcc_addon.services.training import trainers, training_job
 
     there, check = folder / "torch", folder / "check.py"
     check.write_text(
@@ -49,7 +49,7 @@ def _told(until) -> str:
 def trained_for_real(folder: Path) -> None:
     """Train from the panel's own operator in a real second Python, with progress, cancel, and a model at the end."""
     from dcc_addon.operators import training as operator
-    from dcc_addon.services.training_job import problem
+    from dcc_addon.services.training.training_job import problem
     from dcc_addon.session import session
 
     trouble = problem(operator.training_python())

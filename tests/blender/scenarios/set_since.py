@@ -9,7 +9,7 @@ from unittest import SkipTest
 import bpy
 
 from dcc_addon.scene.baked import as_groomed
-from dcc_addon.services.sliders import SLIDERS
+from dcc_addon.services.panel.sliders import SLIDERS
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, bones_at, choose, give_bone_model, make_live, needs_usd
 from tests.blender.panel import told_changed

@@ -133,7 +133,7 @@ def stretched_limb(_folder: Path) -> None:
     """Below a stretched arm, a hand that inherits none of the stretch stays near to where Blender draws it, however far the arm is
     stretched; a mirrored prop in that hand does not prevent sampling.
     """
-    from dcc_addon.services.axes import to_core
+    from dcc_addon.services.rigs.axes import to_core
     from dcc_addon.session import session
 
     places = [((0.67 + 0.06 * k, 0, 1.43), (0.73 + 0.06 * k, 0, 1.43)) for k in range(4)]

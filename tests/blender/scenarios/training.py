@@ -191,7 +191,7 @@ def trained_in_a_shot(folder: Path) -> None:
 def _in_training(folder: Path, notes=(), before: str = ""):
     """Hair of a saved file for which a training runs until `_ended` is called; it copies a model, and does something first."""
     from dcc_addon.operators import training as operator
-    from dcc_addon.services import training_job
+    from dcc_addon.services.training import training_job
 
     (folder / "go").unlink(missing_ok=True)
     child = folder / "child.py"

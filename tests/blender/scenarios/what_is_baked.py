@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from dcc_addon.scene.hair import curves
-from dcc_addon.services.trainers import Trainers
+from dcc_addon.services.training.trainers import Trainers
 from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, points_at, refused, told_by

@@ -6,7 +6,7 @@ import pytest
 from pxr import Usd, UsdGeom
 
 from usd.assets.prims import POLYLINES, author_curves
-from usd.shot.curves import widths_attribute
+from usd.shot.strands.curves import widths_attribute
 
 COUNTS = [2, 3]
 POINTS = np.arange(15.0).reshape(5, 3)

@@ -9,7 +9,7 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 import usd.baking.batches as batches
-import usd.shot.hair_search as hair_search
+import usd.shot.search.hair_search as hair_search
 import usd.shot.stage as stage_reading
 from neuralocks_core.deformation.resolve import Resolver
 from usd.baking.bake import bake

@@ -11,7 +11,7 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.baking.bake import bake
-from usd.baking.header import write_header
+from usd.baking.layer.header import write_header
 from usd.border.stage_files import used_files
 from usd.border.units import Border
 from usd.review.baked import read_baked

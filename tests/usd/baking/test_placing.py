@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, Vt
 
-import usd.baking.placing as placing
+import usd.baking.points.placing as placing
 from neuralocks_core.strands.strand_set import strands_on
 from usd.shot.stage import read_shot
 

@@ -4,7 +4,7 @@
 from inspect import signature
 
 from usd.baking.bake import bake
-from usd.baking.posing import GroomPoser
+from usd.baking.points.posing import GroomPoser
 
 
 def test_what_is_left_out_is_as_in_a_bake():

@@ -15,8 +15,8 @@ from pxr import Sdf
 
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
+from usd.baking.layer.spool import kept, program_files
 from usd.baking.simulate import simulate
-from usd.baking.spool import kept
 from usd.cli.app import main
 from usd.shot.stage import read_shot
 
@@ -77,7 +77,7 @@ def test_a_bake_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path, model, monk
     for number in range(beards):
         Sdf.CopySpec(layer, "/Hero/Hair", layer, f"/Hero/Beard{number}")
     layer.Save()
-    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 3 * 60 * 12 * 12)
+    monkeypatch.setattr("usd.baking.layer.sample_layer.SAVE_EVERY", 3 * 60 * 12 * 12)
     whole, frames, most = bake(shot, out, model).path.read_bytes(), 14 * (1 + beards), 0
     out.unlink()
 
@@ -110,7 +110,7 @@ def test_a_bake_stopped_anywhere_goes_on_to_the_same_bytes(tmp_path, model, monk
 def test_a_layer_that_no_log_can_be_kept_of_is_written_all_the_same(tmp_path, model, monkeypatch):
     """As could be with a later USD: a stopped bake then resumes from its frames, all of which stay."""
     shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
-    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
+    monkeypatch.setattr("usd.baking.layer.sample_layer.SAVE_EVERY", 1)
     whole = bake(shot, out, model).path.read_bytes()
     out.unlink()
 
@@ -121,7 +121,7 @@ def test_a_layer_that_no_log_can_be_kept_of_is_written_all_the_same(tmp_path, mo
         if done == 7:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("usd.baking.save_log._tables", unknown)
+    monkeypatch.setattr("usd.baking.layer.save_log._tables", unknown)
     with pytest.raises(KeyboardInterrupt):
         bake(shot, out, model, progress=stop)
     assert bake(shot, out, model).resumed >= 6 and out.read_bytes() == whole
@@ -131,7 +131,7 @@ def test_a_layer_that_no_log_can_be_kept_of_is_written_all_the_same(tmp_path, mo
 def test_a_stopped_bake_begins_anew_for_other_frames(tmp_path, model, monkeypatch, frames):
     """Also for the same number of frames; then what was saved of it is gone."""
     shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
-    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
+    monkeypatch.setattr("usd.baking.layer.sample_layer.SAVE_EVERY", 1)
     whole = bake(shot, out, model, frames="2:6").path.read_bytes()
 
     def stop(done, total, message):
@@ -152,7 +152,7 @@ def test_a_stopped_bake_goes_on_to_a_file_that_tells_how_it_was_made_now(tmp_pat
     """If the folder was moved, or recorded options that change no sample differ: a layer that finds no shot is worthless."""
     shot, first = write_shot(tmp_path), tmp_path / "one" / "bake.usdc"
     last = tmp_path / changed.pop("folder", "one") / first.name
-    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", 1)
+    monkeypatch.setattr("usd.baking.layer.sample_layer.SAVE_EVERY", 1)
 
     def stop(done, total, message):
         if done == 7:
@@ -170,7 +170,7 @@ def test_ctrl_c_tells_that_the_same_command_goes_on(tmp_path, model):
     shot, out = write_shot(tmp_path), tmp_path / "bake.usdc"
     code = """import os, signal
 from usd.__main__ import main
-from usd.baking.spool import Spool, kept
+from usd.baking.layer.spool import Spool, kept
 signal.signal(signal.SIGINT, signal.default_int_handler)
 write = Spool.write
 def pressed(spool, *frame):
@@ -189,7 +189,7 @@ main()"""
 def test_a_disk_that_fills_up_leaves_finished_frames_to_go_on_from(tmp_path, model, monkeypatch, capsys, save_every):
     shot, out = write_shot(tmp_path, Recipe(strands=500)), tmp_path / "bake.usdc"
     words = ["bake", str(shot), "-o", str(out), "--model", str(model)]
-    monkeypatch.setattr("usd.baking.sample_layer.SAVE_EVERY", save_every)
+    monkeypatch.setattr("usd.baking.layer.sample_layer.SAVE_EVERY", save_every)
     whole = bake(shot, out, model).path.read_bytes()
     out.unlink()
     with pytest.raises(SystemExit) as ended, room_for(len(whole) // 2):
@@ -233,6 +233,11 @@ def test_frames_of_another_version_of_the_program_are_not_taken_over(tmp_path, m
         bake(shot, out, model, progress=stop)
     own.write_text("another")
     assert bake(shot, out, model).resumed == 0
+
+
+def test_all_files_of_the_program_are_looked_at():
+    found = {file.relative_to(ROOT).as_posix() for file in program_files()}
+    assert found >= {"usd/__init__.py", "usd/shot/carriers/seat.py", "neuralocks_core/deformation/clumping.py"}
 
 
 def test_frames_of_a_shot_read_otherwise_are_not_taken_over(tmp_path, model):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pxr import Sdf, Vt
 
-from usd.baking import sample_layer, save_log
-from usd.baking.sample_layer import SampleLayer
-from usd.baking.save_log import HEADER, SaveLog, spent_frames
+from usd.baking.layer import sample_layer, save_log
+from usd.baking.layer.sample_layer import SampleLayer
+from usd.baking.layer.save_log import HEADER, SaveLog, spent_frames
 
 HAIR, SPENT = Sdf.Path("/Hair"), range(1, 13)
 

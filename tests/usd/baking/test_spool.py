@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core.errors import CannotWrite, NeuralocksError
-from usd.baking.spool import Spool, _remove, fingerprint
+from usd.baking.layer.spool import Spool, _remove, fingerprint
 
 
 def read(spool, code, rows, batch=0):
@@ -141,7 +141,7 @@ def test_the_folder_is_locked_until_it_is_gone(tmp_path, monkeypatch):
         _remove(path)
 
     spool.write(0, 1.0, np.zeros((2, 3)))
-    monkeypatch.setattr("usd.baking.spool._remove", checked)
+    monkeypatch.setattr("usd.baking.layer.spool._remove", checked)
     spool.discard()
     assert len(removed) == 2 and not list(tmp_path.iterdir())
 

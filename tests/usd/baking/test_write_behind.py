@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from usd.baking.write_behind import WriteBehind
+from usd.baking.layer.write_behind import WriteBehind
 
 
 def test_calls_are_made_in_order_and_all_of_them():

@@ -210,7 +210,7 @@ def test_the_runtime_imports_only_what_inference_needs():
     code = f"import sys; import %s; print([m for m in {absent} if m in sys.modules])"
     for module in (
         "neuralocks_core.models.runtime, neuralocks_core.deformation.resolve",
-        "usd.baking.bake, usd.baking.posing, usd.shot.stage",
+        "usd.baking.bake, usd.baking.points.posing, usd.shot.stage",
     ):
         command = [sys.executable, "-c", code % module]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)

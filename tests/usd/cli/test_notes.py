@@ -4,7 +4,7 @@
 import json
 
 from neuralocks_core.rig.carried import CarriedHair
-from usd.baking.posing import GroomPoser
+from usd.baking.points.posing import GroomPoser
 from usd.rig.stage import read_rigged_hair
 
 from ..commands import status

@@ -6,7 +6,7 @@ import sys
 from types import SimpleNamespace
 
 from usd.baking.bake import bake
-from usd.baking.posing import GroomPoser
+from usd.baking.points.posing import GroomPoser
 from usd.cli import progress
 
 from ..shots import Recipe, write_shot

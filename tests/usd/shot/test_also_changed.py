@@ -8,9 +8,9 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair
-from usd.shot.also_changed import also_changed
-from usd.shot.curves import find_curves
+from usd.shot.bakes.also_changed import also_changed
 from usd.shot.stage import read_shot
+from usd.shot.strands.curves import find_curves
 
 from ..rig_shots import model_for, small_shot
 from ..shots import Recipe, samples, write_shot

@@ -8,8 +8,8 @@ from pxr import Usd, UsdGeom, Vt
 from usd.baking.bake import bake
 from usd.review.baked import read_baked
 from usd.review.inspect import inspect
-from usd.shot.curve_ends import beyond_ends, ends, undrawn
 from usd.shot.stage import read_shot
+from usd.shot.strands.curve_ends import beyond_ends, ends, undrawn
 
 from ..shots import Recipe, samples, strand_points, world_points, write_shot
 

@@ -11,8 +11,8 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.rest_copy import NAME
 from usd.assets.importing import import_groom
 from usd.baking.bake import bake
-from usd.shot.curves import left_as_they_are, moment, read_groom
 from usd.shot.stage import read_shot
+from usd.shot.strands.curves import left_as_they_are, moment, read_groom
 
 from ...core.formats.groom_files import write_hair
 from ..shots import Recipe, samples, world_points, write_shot

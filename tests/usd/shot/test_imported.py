@@ -6,7 +6,7 @@ import pytest
 from pxr import Usd, UsdGeom, Vt
 
 from neuralocks_core.errors import NeuralocksError
-from usd.shot.imported import imported_and_rest
+from usd.shot.strands.imported import imported_and_rest
 
 POINTS = np.arange(18, dtype=np.float32).reshape(6, 3)
 

@@ -4,7 +4,7 @@
 import pytest
 from pxr import Gf, Usd, UsdGeom
 
-from usd.shot import skeletons
+from usd.shot.characters import skeletons
 from usd.shot.stage import read_shot
 
 from ..shots import Recipe, write_shot

@@ -8,7 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.review.baked import read_baked
-from usd.shot import ways
+from usd.shot.carriers import ways
 from usd.shot.stage import read_rigs, read_shot
 
 from ..shots import CENTRE, HEAD, Recipe, write_shot

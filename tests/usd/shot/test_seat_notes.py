@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from neuralocks_core.body.collider import Collider
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
-from usd.shot import seat_notes
+from usd.shot.carriers import seat_notes
 from usd.shot.stage import read_shot
 from usd.skel import stage_rig
 

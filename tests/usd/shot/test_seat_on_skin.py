@@ -7,7 +7,7 @@ from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 from usd.baking.bake import bake
 from usd.border.placement import Placement
-from usd.shot.seat import NEAR, find_seat
+from usd.shot.carriers.seat import NEAR, find_seat
 from usd.shot.stage import read_rigs, read_shot
 from usd.skel import skin, surface
 

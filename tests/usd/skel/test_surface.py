@@ -9,8 +9,8 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.review.baked import read_baked
 from usd.review.inspect import inspect
-from usd.shot.curves import rest_points
 from usd.shot.stage import read_rigs, read_shot
+from usd.shot.strands.curves import rest_points
 from usd.skel.binding import bound_skeleton
 
 from ..shots import CENTRE, HEAD, JOINTS, RIG, Recipe, samples, write_shot
