@@ -30,8 +30,8 @@ from neuralocks_core.motion import Clip
 from neuralocks_core.reference import simulate
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
-from neuralocks_core.training.hair_body import hair_body, posed_over_time
-from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
+from neuralocks_core.training.material.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.material.rollouts import RolloutMaker, TrainingScene
 
 EVERY = ("shake", "turn", "walk", "jump", "nod", "bow")
 SHOWS = {

@@ -44,9 +44,9 @@ from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.reference import simulate, stateless_floor
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import strands_on
-from neuralocks_core.training.hair_body import hair_body, posed_over_time
-from neuralocks_core.training.mirror import POLAR, mirrored_strands, mirrored_vectors
-from neuralocks_core.training.rollouts import RolloutMaker, held_out_split
+from neuralocks_core.training.material.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.material.mirror import POLAR, mirrored_strands, mirrored_vectors
+from neuralocks_core.training.material.rollouts import RolloutMaker, held_out_split
 
 SEED = 7001
 STRANDS = 120

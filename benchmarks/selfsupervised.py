@@ -24,14 +24,14 @@ from neuralocks_core.models.network_sizes import LOCK_CODES
 from neuralocks_core.physics.bend_twist import Cosserat
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.beginning import kept_coder
-from neuralocks_core.training.farm import load
 from neuralocks_core.training.gauge import measure
-from neuralocks_core.training.methods import MomentMethod
-from neuralocks_core.training.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.learning.methods import MomentMethod
+from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.learning.regression import RolloutBank, predicted
+from neuralocks_core.training.learning.selfsupervised import paper_boundary
+from neuralocks_core.training.material.farm import load
+from neuralocks_core.training.material.rollouts import RolloutMaker, TrainingScene
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import RolloutBank, predicted
-from neuralocks_core.training.rollouts import RolloutMaker, TrainingScene
-from neuralocks_core.training.selfsupervised import paper_boundary
 
 OURS, PAPER = SelfSupervisedOptions(), SelfSupervisedOptions.paper()
 

@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from neuralocks_core.metrics import swings
+from neuralocks_core.training.learning.regression import RolloutBank, predicted
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import RolloutBank, predicted
 
 
 @dataclass(frozen=True)

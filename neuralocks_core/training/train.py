@@ -20,13 +20,13 @@ from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
 from neuralocks_core.training.beginning import Beginning, kept_coder
 from neuralocks_core.training.export import strand_graphs
-from neuralocks_core.training.farm import RolloutFarm, check_guarded
-from neuralocks_core.training.methods import method_of
-from neuralocks_core.training.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.learning.methods import method_of
+from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.learning.regression import RolloutBank
+from neuralocks_core.training.learning.regression_options import RegressionOptions
+from neuralocks_core.training.material.farm import RolloutFarm, check_guarded
+from neuralocks_core.training.material.rollouts import TrainingScene, kept_from_training, learned_measures
 from neuralocks_core.training.option_checks import check_options
-from neuralocks_core.training.regression import RolloutBank
-from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import TrainingScene, kept_from_training, learned_measures
 from neuralocks_core.training.run import Run, plain
 from neuralocks_core.training.threads import threads
 from neuralocks_core.training.work import (

@@ -54,7 +54,7 @@ def train(
         grooms: USD files, names of styles of the library (`neuralocks_core.hairstyles.STYLES`), or "library" for all of these.
         motion: BVH or USD files.
         out: `.neuralocks` file to write.
-        settings: fields of `training.regression_options.RegressionOptions`, or of `training.moment_options.SelfSupervisedOptions`;
+        settings: fields of `RegressionOptions` or `SelfSupervisedOptions` (`training.learning.regression_options`, `moment_options`);
             values may be words.
         method: "rollouts" of the solver, or "selfsupervised" as in the paper.
         paper: with "selfsupervised", use what the paper states, including its boundary history, unless `settings` say otherwise.
@@ -82,10 +82,10 @@ def train(
     check_training()
     import torch
 
-    from neuralocks_core.training.moment_options import SelfSupervisedOptions
+    from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
+    from neuralocks_core.training.learning.regression_options import RegressionOptions
+    from neuralocks_core.training.learning.selfsupervised import paper_boundary
     from neuralocks_core.training.option_checks import check_options
-    from neuralocks_core.training.regression_options import RegressionOptions
-    from neuralocks_core.training.selfsupervised import paper_boundary
     from neuralocks_core.training.train import train_strands
     from neuralocks_core.training.work import BEGINNING, work_folder
 
@@ -129,7 +129,7 @@ def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, opti
         NeuralocksError: the file named is not a model, or differs from what is trained.
     """
     from neuralocks_core.training.beginning import Beginning
-    from neuralocks_core.training.regression_options import RegressionOptions
+    from neuralocks_core.training.learning.regression_options import RegressionOptions
 
     if begin == NOTHING or (begin is None and (resume or not isinstance(options, RegressionOptions))):
         return None

@@ -15,7 +15,7 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
-from neuralocks_core.training.rollouts import LEAST, TrainingScene
+from neuralocks_core.training.material.rollouts import LEAST, TrainingScene
 
 from ..assets.grow import Barber
 from ..border.damage import names_damage

@@ -17,6 +17,7 @@ from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
 from neuralocks_core.training.descent import Descended
+from neuralocks_core.training.material.rollouts import STOPS
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
 from neuralocks_core.training.rig.deepest import LATE, DeepestPoses
 from neuralocks_core.training.rig.energy import RigEnergy
@@ -25,7 +26,6 @@ from neuralocks_core.training.rig.motion import RATE, motion_report, simulate_mo
 from neuralocks_core.training.rig.network import TinyNet
 from neuralocks_core.training.rig.poses import Moments
 from neuralocks_core.training.rig.report import static_report
-from neuralocks_core.training.rollouts import STOPS
 from neuralocks_core.training.threads import threads
 
 _VELOCITY = 20.0

@@ -11,7 +11,7 @@ from tests.core.rigs import person, straight_hair
 @pytest.fixture(scope="module")
 def scene():
     """One head with a little straight hair."""
-    from neuralocks_core.training.rollouts import TrainingScene  # needs torch: modules without it are skipped
+    from neuralocks_core.training.material.rollouts import TrainingScene  # needs torch: modules without it are skipped
 
     return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
 
@@ -19,7 +19,7 @@ def scene():
 @pytest.fixture
 def few(monkeypatch):
     """Trainings begin after four simulations, and are measured on two."""
-    monkeypatch.setattr("neuralocks_core.training.methods.FIRST", 4)
+    monkeypatch.setattr("neuralocks_core.training.learning.methods.FIRST", 4)
     monkeypatch.setattr("neuralocks_core.training.train.HELD_OUT", 2)
 
 
@@ -29,7 +29,7 @@ def in_one_process(monkeypatch):
     training has two.
     """
     monkeypatch.setattr("neuralocks_core.training.train.RolloutFarm", _Farm)
-    monkeypatch.setattr("neuralocks_core.training.methods.LOOK_AGAIN", 0.0)
+    monkeypatch.setattr("neuralocks_core.training.learning.methods.LOOK_AGAIN", 0.0)
 
 
 class _Farm:
@@ -58,8 +58,8 @@ class _Farm:
         return False
 
     def _make(self, path: Path) -> None:
-        from neuralocks_core.training.farm import save
-        from neuralocks_core.training.rollouts import RolloutMaker
+        from neuralocks_core.training.material.farm import save
+        from neuralocks_core.training.material.rollouts import RolloutMaker
 
         self._maker = self._maker or RolloutMaker(self._scene)
         save(path, self._maker.make(int(path.stem)))

@@ -10,7 +10,8 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from neuralocks_core.errors import NeuralocksError  # noqa: E402
-from neuralocks_core.training import checkpoint, farm  # noqa: E402
+from neuralocks_core.training import checkpoint
+from neuralocks_core.training.material import farm  # noqa: E402
 from neuralocks_core.training.muon import muon  # noqa: E402
 
 NAN = np.float32(np.nan)

@@ -18,8 +18,10 @@ pytest.importorskip("warp", reason="the extra 'train' is not installed")
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models.network_sizes import K
-from neuralocks_core.training import checkpoint, farm, methods
-from neuralocks_core.training.rollouts import FINEST, Rollout
+from neuralocks_core.training import checkpoint
+from neuralocks_core.training.learning import methods
+from neuralocks_core.training.material import farm
+from neuralocks_core.training.material.rollouts import FINEST, Rollout
 
 
 def farm_of(monkeypatch, folder, *processes):
@@ -197,7 +199,7 @@ def test_a_process_that_fails_says_why_and_leaves_ctrl_c_to_the_trainer(tmp_path
 
 UNGUARDED = """
 import sys, time
-from neuralocks_core.training.farm import RolloutFarm
+from neuralocks_core.training.material.farm import RolloutFarm
 from neuralocks_core.training.train import train_strands
 
 if __name__ != "__main__":
@@ -214,7 +216,7 @@ def test_a_script_without_a_guard_is_told_and_does_not_hang(tmp_path):
     pytest.importorskip("torch", reason="the extra 'train' is not installed")
     script = tmp_path / "script.py"
     script.write_text(UNGUARDED, "utf-8")
-    found = os.environ | {"PYTHONPATH": str(Path(farm.__file__).parents[2])}
+    found = os.environ | {"PYTHONPATH": str(Path(farm.__file__).parents[3])}
     done = subprocess.run(
         [sys.executable, script, tmp_path], capture_output=True, text=True, env=found, timeout=100, check=True
     )

@@ -8,8 +8,8 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 
 from neuralocks_core.materials import MARGIN
 from neuralocks_core.models.network_sizes import STRAND, K
-from neuralocks_core.training.regression_losses import CREEP, STILL, TOGETHER, regression_losses
-from neuralocks_core.training.regression_options import RegressionOptions
+from neuralocks_core.training.learning.regression_losses import CREEP, STILL, TOGETHER, regression_losses
+from neuralocks_core.training.learning.regression_options import RegressionOptions
 
 EDGE, KINK = 0.01, 0.6
 

@@ -18,11 +18,12 @@ pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.models.runtime import StrandModel
-from neuralocks_core.training import checkpoint, methods
-from neuralocks_core.training.farm import load, save
-from neuralocks_core.training.moment_options import SelfSupervisedOptions
-from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import RolloutMaker, held_out_split, kept_from_training
+from neuralocks_core.training import checkpoint
+from neuralocks_core.training.learning import methods
+from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.learning.regression_options import RegressionOptions
+from neuralocks_core.training.material.farm import load, save
+from neuralocks_core.training.material.rollouts import RolloutMaker, held_out_split, kept_from_training
 from neuralocks_core.training.train import train_strands
 from neuralocks_core.training.work import claimed
 
@@ -107,7 +108,7 @@ def test_a_run_of_so_many_steps_is_the_same_however_fast_its_simulations_come(
     scene, few, in_one_process, tmp_path, monkeypatch
 ):
     """With a budget in seconds, each step learns from what happens to be there."""
-    monkeypatch.setattr("neuralocks_core.training.methods.STEPS_EACH", 2)
+    monkeypatch.setattr("neuralocks_core.training.learning.methods.STEPS_EACH", 2)
     graphs = []
     for name, ready in (("early", 6), ("late", 0)):
         out = tmp_path / f"{name}.neuralocks"

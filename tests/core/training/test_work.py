@@ -81,7 +81,7 @@ def test_simulations_made_otherwise_are_not_gone_on_with(tmp_path, monkeypatch, 
 def test_simulations_of_another_body_or_motion_are_not_gone_on_with(tmp_path):
     """Each part of it that a simulation is made from counts."""
     pytest.importorskip("warp", reason="the extra 'train' is not installed")
-    from neuralocks_core.training.rollouts import TrainingScene
+    from neuralocks_core.training.material.rollouts import TrainingScene
 
     points = np.random.default_rng(0).normal(size=(9, 3))
     body = Body(points, np.array([[0, 1, 2]]), np.full((9, 1), HEAD), np.ones((9, 1)), {"large": 0.1 * points})

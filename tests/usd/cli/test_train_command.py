@@ -69,7 +69,7 @@ def test_training_methods_and_settings_are_checked_before_anything_is_read(tmp_p
 def test_settings_are_words_for_fields():
     pytest.importorskip("torch", reason="the extra 'train' is not installed")
     from neuralocks_core.physics.bend_twist import Cosserat
-    from neuralocks_core.training.moment_options import SelfSupervisedOptions
+    from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
     from usd.models.train import parsed
 
     words = {"form": "direct", "paper_adhesion": "yes", "style": "1,2.5", "poses": "4", "rate": "1e-4", "steps": "7"}

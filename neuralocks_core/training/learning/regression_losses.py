@@ -8,8 +8,8 @@ from torch import Tensor
 
 from neuralocks_core.materials import MARGIN
 from neuralocks_core.models.network_sizes import K
+from neuralocks_core.training.learning.regression_options import RegressionOptions
 from neuralocks_core.training.networks import StrandNet, deform
-from neuralocks_core.training.regression_options import RegressionOptions
 
 STILL = 0.01
 """Motion, in strand lengths, below which a strand counts as standing still."""

@@ -13,14 +13,14 @@ import numpy as np
 from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.strands.strand_set import StrandSet
 from neuralocks_core.training.descent import Descended
-from neuralocks_core.training.farm import RolloutFarm
-from neuralocks_core.training.moment_options import SelfSupervisedOptions
-from neuralocks_core.training.moments import MOMENTS, MomentPool
+from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
+from neuralocks_core.training.learning.regression import FIRST, RolloutBank, regress
+from neuralocks_core.training.learning.regression_options import RegressionOptions
+from neuralocks_core.training.learning.selfsupervised import train_on_moments
+from neuralocks_core.training.material.farm import RolloutFarm
+from neuralocks_core.training.material.moments import MOMENTS, MomentPool
+from neuralocks_core.training.material.rollouts import TrainingScene
 from neuralocks_core.training.networks import StrandNet
-from neuralocks_core.training.regression import FIRST, RolloutBank, regress
-from neuralocks_core.training.regression_options import RegressionOptions
-from neuralocks_core.training.rollouts import TrainingScene
-from neuralocks_core.training.selfsupervised import train_on_moments
 
 STEPS_EACH = 10
 """Steps per further clip, in a run with a given number of steps: about as many as two cores take while one clip is made."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The methods of learning: what is minimised, and its options."""
