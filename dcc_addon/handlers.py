@@ -57,18 +57,19 @@ def before_update(*_):
 def on_update(scene, graph):
     """Something was edited: follow a pose made by hand, and notice edited animation."""
     switched, session.switched = session.switched, set()
+    renewed, session.renewed = session.renewed, False
     if session.paused:
         return
     view.forget_gone()
     changed = [update.id for update in graph.updates]
     objects = {thing.name_full: thing.original for thing in changed if isinstance(thing, bpy.types.Object)}
-    forget_data(graph)
+    forget_data(graph, renewed)
     make_comparable(objects.values())  # a library may have been reloaded
     show_rest_left(objects.values())
     if view.bereft(scene):
         view.update(scene, graph)
     carriers = view.carriers(scene)
-    mark_stale(graph, changed, carriers, switched)
+    mark_stale(graph, changed, carriers, switched, renewed)
     if not carriers:
         return
     retry_failed(changed)
@@ -84,6 +85,7 @@ def on_load(*_):
     """Another file was opened: nothing that is known belongs to it."""
     background.cancel()
     session.clear()
+    session.renewed = True
     if bpy.data.filepath:
         session.opened = {scene.name_full: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
     model_updates.compare()
@@ -101,6 +103,7 @@ def on_load(*_):
 def on_undo(scene, *_):
     """Undo may have brought back another pose, groom or choice."""
     session.doubt()
+    session.renewed = True
     named_from.remember(bpy.data.objects)
     view.forget_gone()
     view.forget_ended()

@@ -10,38 +10,43 @@ from .live.edited import touched
 from .live.live_strands import EDITING, known
 from .scene.baked import body_known
 from .scene.motion.shapes import follows
-from .scene.objects.keyed import concerns, users_of
+from .scene.motion.undone import as_sampled
+from .scene.objects.keyed import concerns
 from .scene.objects.lookup import find
 from .session import session
 
 
-def forget_data(graph) -> None:
+def forget_data(graph, renewed: bool) -> None:
     """Weights and shapes of meshes, and points of grooms, that were edited are read again."""
     body_known.updated(graph.updates)
     for thing in (update.id for update in graph.updates):
         if isinstance(thing, bpy.types.Mesh):
             session.read.weights.pop(thing.name_full, None)
+            session.read.edited |= set() if renewed else {thing.name_full}
         elif isinstance(thing, bpy.types.Curves):
             session.read.grooms.pop(thing.name_full, None)
 
 
-def mark_stale(graph, changed, carriers, switched: set[str]) -> None:
+def mark_stale(graph, changed, carriers, switched: set[str], renewed: bool) -> None:
     """Motions are out of date if a body was edited, whichever scene shows it, or keys of any action that was not just `switched`; they
-    are wanted of these armatures.
+    are wanted of these armatures. If everything is `renewed`, as by an undo, it is compared first.
     """
     if not (carriers or session.rigs):
         return
     own = [thing.original for thing in changed]
-    edited = _edits_body(graph, own)
+    edited = _edits_body(graph, own, renewed)
     keys = [thing for thing in own if isinstance(thing, bpy.types.Action) and thing.name_full not in switched]
-    users = users_of(keys) if keys else []
+    users = bpy.data.user_map(subset=keys) if keys else {}
     if not carriers:  # other keys show in poses, at which a render looks
-        users = [each for each in users if any(isinstance(user, bpy.types.Key) for user in each)]
+        users = {key: each for key, each in users.items() if any(isinstance(user, bpy.types.Key) for user in each)}
     if not (edited or users):
         return
-    found = [rig for rig in session.rigs.values() if edited or any(concerns(each, rig.moved_by) for each in users)]
-    for sampled in found:
-        sampled.stale = True
+    found = []
+    for name, sampled in session.rigs.items():
+        moving = [action for action, each in users.items() if concerns(each, sampled.moved_by)]
+        if (edited or moving) and not (renewed and as_sampled(name, sampled, moving, edited)):
+            found.append(sampled)
+            sampled.stale = True
     session.edits += 1
     session.sampling.failed.clear()
     lacking = any(armature.name_full not in session.rigs for armature in carriers)
@@ -78,12 +83,14 @@ def edited(thing) -> bool:
     return thing.mode in EDITING or not known(thing) or touched(thing)
 
 
-def _edits_body(graph, own: list) -> bool:
-    """Whether an update, of these data blocks of the file, edits a sampled body by more than what its shape keys read."""
+def _edits_body(graph, own: list, renewed: bool) -> bool:
+    """Whether an update, of these data blocks of the file, edits a sampled body by more than what its shape keys read; if everything
+    is `renewed`, whether it may.
+    """
     edited = {u.id.name_full for u in graph.updates if isinstance(u.id, bpy.types.Mesh) and u.is_updated_geometry}
     names = {name for rig in session.rigs.values() for name in rig.bodies} if edited else ()
     bodies = {body.data for name in names if (body := find(name)) is not None and body.data.name_full in edited}
-    return any(not follows(mesh, own) for mesh in bodies)
+    return any(renewed or not follows(mesh, own) for mesh in bodies)
 
 
 def _is_live(thing) -> bool:

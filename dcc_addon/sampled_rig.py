@@ -50,6 +50,8 @@ class SampledRig:
     """The unkeyed pose; see `scene.motion.sampled_from.posture_of`."""
     unreported: dict[str, int]
     """Numbers of what Blender may not report of the bodies, by name; see `scene.motion.rigging.unreported`."""
+    actions: dict[str, int]
+    """Numbers of the actions that moved it, by name; see `scene.motion.undone`."""
     moved_by: frozenset[str]
     """Names of the objects that moved it; see `scene.motion.sampled_from.moved_by`."""
     carriers: dict[str, int]

@@ -48,6 +48,8 @@ class Session:
     """How often animation was edited: what was sampled meanwhile is out of date."""
     switched: set[str] = field(default_factory=set)
     """Actions that Blender will report as edited, because some of their curves were muted; see `scene.hair.switches`."""
+    renewed: bool = False
+    """Whether a file was opened, or an undo done, since Blender last reported edits: it then reports everything as edited."""
     watched: set[str] = field(default_factory=set)
     """Objects that Blender evaluates although they are hidden; see `scene.drawing.watched`."""
     opened: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -123,6 +125,8 @@ class Read:
 
     weights: dict[str, tuple[tuple, np.ndarray]] = field(default_factory=dict)
     """Weights of body meshes, by mesh name; dropped when a mesh is edited."""
+    edited: set[str] = field(default_factory=set)
+    """Meshes that were edited since the file was opened: an undo can only change these."""
     grooms: dict[str, int] = field(default_factory=dict)
     """A number of the rest points of each groom that plays a cache, by the name of its Curves; dropped when these are edited."""
     bodies: dict[tuple, tuple] = field(default_factory=dict)

@@ -34,6 +34,7 @@ from ..objects.relations import found_anew
 from .rigging import unreported
 from .sampled_from import frames_of, key_of, moved_by, posture_of, rigging_of
 from .stepping import step, stepping
+from .undone import numbers_of
 
 BLOCK, MANY = 256, 6000
 """Most frames whose poses are converted to channels together, and most joints in all of them: on so few numbers, one frame costs as
@@ -101,6 +102,7 @@ class _Recording:
             "unreported": {body.name_full: unreported(body) for body in bodies},
             "moved_by": moved_by(armature, scene),
         }
+        self._depends["actions"] = numbers_of(self._depends["moved_by"])
         self._edits = session.edits
         self.frames = frame_numbers(*frames_of(scene), scene.neuralocks.subframes)
         self._rate = rate_of(scene)

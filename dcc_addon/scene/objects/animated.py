@@ -36,6 +36,14 @@ def curves_of(data, without=()) -> list:
     return [*data.drivers, *(curve for user in (data, *strips_of(data, without)) for curve in _curves(user))]
 
 
+def curves_in(action, slot: int | None = None) -> list:
+    """F-curves of an action; of one of its slots, if a handle is given."""
+    if not hasattr(action, "layers"):
+        return list(action.fcurves)
+    bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+    return [curve for bag in bags if slot in (None, bag.slot_handle) for curve in bag.fcurves]
+
+
 def targets_of(data) -> list[tuple]:
     """What the drivers of some animation data read: each target, after the variable that it belongs to."""
     variables = [variable for curve in data.drivers for variable in curve.driver.variables]
@@ -58,8 +66,4 @@ def _constant(curve) -> bool:
 
 def _curves(user) -> list:
     """F-curves that animation data, or a strip, plays of its action: since Blender 4.4 those of one slot."""
-    action = user.action
-    if action is None or not hasattr(user, "action_slot_handle"):
-        return list(action.fcurves) if action is not None else []
-    bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
-    return [curve for bag in bags if bag.slot_handle == user.action_slot_handle for curve in bag.fcurves]
+    return [] if user.action is None else curves_in(user.action, getattr(user, "action_slot_handle", None))

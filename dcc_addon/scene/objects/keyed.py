@@ -18,11 +18,6 @@ def concerns(users, moved_by: frozenset[str]) -> bool:
     return not users or any(not _elsewhere(user, moved_by) for user in users)
 
 
-def users_of(actions) -> list[set]:
-    """The data blocks that play each action."""
-    return list(bpy.data.user_map(subset=actions).values())
-
-
 def _elsewhere(user, moved_by: frozenset[str]) -> bool:
     if not isinstance(user, bpy.types.Object) or user.name_full in moved_by:
         return False

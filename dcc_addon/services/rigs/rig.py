@@ -182,6 +182,14 @@ def same(a: Character, b: Character) -> bool:
     return all(np.array_equal(one, other) for one, other in pairs)
 
 
+def same_arrays(a: BodyArrays, b: BodyArrays) -> bool:
+    """Whether two bodies are the same, to the last bit."""
+    if (a.name, a.groups, list(a.shapes)) != (b.name, b.groups, list(b.shapes)):
+        return False
+    pairs = [(getattr(a, part), getattr(b, part)) for part in ("points", "triangles", "weights")]
+    return all(np.array_equal(one, other) for one, other in [*pairs, *zip(a.shapes.values(), b.shapes.values())])
+
+
 def size_shown(rig: RigArrays, place: np.ndarray, heads: np.ndarray) -> float:
     """How much larger a motion shows the head than the bind pose does, as `usd` measures it in a stage; `heads` are its world
     transforms (T, 4, 4) from channels, `place` is as for `character`.
