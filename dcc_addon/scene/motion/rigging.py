@@ -52,6 +52,9 @@ def unreported(body) -> int:
     keys = body.data.shape_keys
     curves = curves_of(keys.animation_data) if keys else ()
     found = [*shape(body), *((curve.data_path, number_of_keys(curve)) for curve in curves), weighed_so(body)]
+    if keys:
+        still = [name for name in ("use_relative", "eval_time") if name not in animated(keys.animation_data)]
+        found += [*as_set(keys, still), [block.frame for block in keys.key_blocks]]
     return recorded.number_of(found)
 
 

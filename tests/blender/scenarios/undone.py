@@ -72,6 +72,7 @@ def undone_edit(_folder: Path) -> None:
         "weight": lambda: skin().vertex_groups[0].add([7], 0.25, "REPLACE"),
         "faces": lambda: skin().data.flip_normals(),
         "shape": lambda: setattr(skin().data.shape_keys.key_blocks["Keyed"].data[3], "co", (0.5, 0.5, 0.5)),
+        "relative": lambda: setattr(skin().data.shape_keys, "use_relative", False),
         "held": lambda: setattr(skin().data.shape_keys.key_blocks["Held"], "value", 0.9),
     }
     for what, change in changes.items():
