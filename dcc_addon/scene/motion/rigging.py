@@ -30,7 +30,7 @@ _ONE = re.compile(r"(?:\[(\d+)\]|\.[wxyz])$")
 def rigging(things) -> int:
     """A number that changes when the setup of one of these objects, or of one that it depends on, changes."""
     others = reached(things)[len(things) :]
-    shaping = [_modifiers(thing, up_to_armature(thing)) for thing in things if thing.type == "MESH"]
+    shaping = [_shaped_by(thing) for thing in things if thing.type == "MESH"]
     found = [*map(_object, things), *shaping, *([*_object(thing), *_modifiers(thing)] for thing in others)]
     return recorded.number_of(found)
 
@@ -210,6 +210,11 @@ def _constraint(constraint, start: str, moving: set[str]) -> list:
     still = [name for name in (*settings_of(constraint), "influence") if start + name not in moving]
     several = [(t.target and t.target.name_full, t.subtarget) for t in getattr(constraint, "targets", ())]
     return [constraint.name, constraint.type, several, *as_set(constraint, still)]
+
+
+def _shaped_by(body) -> list:
+    """What deforms a body: modifiers, and the names by which bones find its vertices, which Blender does not report."""
+    return [*_modifiers(body, up_to_armature(body)), *(group.name for group in body.vertex_groups)]
 
 
 def _modifiers(thing, some=None) -> list:

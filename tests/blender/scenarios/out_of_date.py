@@ -187,3 +187,17 @@ def keyed_elsewhere(_folder: Path) -> None:
         assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"}
     assert told(camera, "location", 2.0) == [True, False]
     assert told(camera.data, "lens") == both, "what else reads a lens is not known"
+
+
+def group_renamed(_folder: Path) -> None:
+    """A body whose vertex group has another name follows another bone, or none: its motion is out of date, until it has its name back."""
+    from dcc_addon.scene.motion.up_to_date import known
+
+    rig, strands = scenes.dancer(10, skinned=True)
+    make_live(rig, strands)
+    scene, group = bpy.context.scene, bpy.data.objects["Body"].vertex_groups["head"]
+    sampled = known(rig, scene)
+    group.name = "nothing"
+    assert sampled is not None and known(rig, scene) is None
+    group.name = "head"
+    assert bpy.ops.neuralocks.sample_motion() == {"FINISHED"} and known(rig, scene) is not None
