@@ -265,6 +265,6 @@ class _Recording:
                 *body_drawn.all_told(armature, bodies, self._bodies_at, character, clip, self._unit),
                 *rigid_parts.told(armature, parts, list(hairs.values()), binds),
             ),
-            leaps=leaps_told(clip, character.head, motion.frames),
+            leaps=leaps_told(clip, character, motion.frames),
             hairs_off=riding.strays_told(on_head, rig, self._heads, self._moved, self._places, self._unit),
         )
