@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on's services, without Blender: rigs, bodies, names, and what the panel says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -115,6 +117,40 @@ def test_character_faces_forward_and_says_what_is_missing():
     assert rig.advice(found) == []
     lame = rig.RigArrays("Rig", BONES[:4], PARENTS[:4], rest()[:4])
     assert any("left arm" in line for line in rig.advice(lame))
+
+
+def test_the_head_bone_that_is_chosen_is_the_head():
+    found = rig.RigArrays("Rig", BONES, PARENTS, rest(), "neck")
+    assert BONES[found.humanoid["head"]] == "neck"
+
+
+def test_bodies_and_characters_are_the_same_only_in_all_their_numbers():
+    """What is bound to a character, or was sampled with a body, is used again only then."""
+    shapes = {"wide": np.full((3, 3), 0.5)}
+    weights = np.array([[0, 0, 1.0], [1, 1, 1.0]])
+    body = rig.BodyArrays("b", np.eye(3), np.array([[0, 1, 2]]), BONES[:2], weights, shapes)
+    found = rig.RigArrays("Rig", BONES, PARENTS, rest())
+
+    def character(body: rig.BodyArrays):
+        return rig.character(found, np.eye(4), [(body, np.eye(4))])
+
+    alike = replace(body, points=np.eye(3), shapes={"wide": np.full((3, 3), 0.5)})
+    assert rig.same_arrays(body, alike) and rig.same(character(body), character(alike))
+    for change in (
+        {"points": 1.1 * np.eye(3)},
+        {"triangles": np.array([[1, 0, 2]])},
+        {"weights": np.array([[0, 1, 1.0], [1, 1, 1.0]])},
+        {"shapes": {"wide": np.full((3, 3), 0.6)}},
+        {"shapes": {"thin": np.full((3, 3), 0.5)}},
+        {"groups": BONES[1:3]},
+    ):
+        other = replace(body, **change)
+        assert not rig.same_arrays(body, other), change
+        if "triangles" not in change:  # which is turned right side out
+            assert not rig.same(character(body), character(other)), change
+    assert not rig.same_arrays(body, replace(body, name="c"))
+    taller = rig.RigArrays("Rig", BONES, PARENTS, 1.1 * rest())
+    assert not rig.same(rig.character(found, np.eye(4)), rig.character(taller, np.eye(4)))
 
 
 @pytest.mark.parametrize(
