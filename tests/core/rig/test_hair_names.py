@@ -1,7 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What names say of joints: hair, faces and what is worn, in many conventions and languages."""
 
-from neuralocks_core.rig.hair_names import says_face, says_hair, says_hair_alone
+from neuralocks_core.rig.hair_names import (
+    says_end,
+    says_face,
+    says_feature,
+    says_hair,
+    says_hair_alone,
+    says_twist,
+    says_worn,
+)
 
 
 def test_what_names_of_many_conventions_say():
@@ -50,3 +58,25 @@ def test_what_says_hair_wherever_it_hangs():
     assert all(map(says_hair_alone, "hair0_0 J_Sec_Hair1_01 PonyTail_L 左髪_1 braid_02 Mane_01".split()))
     other = "coat_tail_01 jacket_fringe_L strand_2 index_curl_L lock_01 bundle_3 HairPin_L scarf_01"
     assert [name for name in other.split() if says_hair_alone(name)] == []
+
+
+def test_what_belongs_to_the_face_itself():
+    """Neither what grows on it nor what it wears, nor the ears of a costume."""
+    features = "leftEye jaw_1 lip_curl_1 ear_L elfEar_L LeftEar temple_R 左目 まつ毛 右耳 혀"
+    others = "beard_1 whisker_L CatEar_R cat_ear_L Fox_Ear_1 猫耳_L nekomimi hat_1 earring_L hair_pin_L Hair_01 neck"
+    assert [name for name in features.split() if not says_feature(name)] == []
+    assert [name for name in others.split() if says_feature(name)] == []
+
+
+def test_what_is_worn_in_hair():
+    worn = "hair_pin_L HairRibbon_1 髪飾り左 feather_L bow_1 scrunchie"
+    others = "bowl_1 hair_feathered_l crown_1 Hair_01 eye_L"
+    assert [name for name in worn.split() if not says_worn(name)] == []
+    assert [name for name in others.split() if says_worn(name)] == []
+
+
+def test_ends_and_twists_are_told_by_whole_words():
+    assert all(map(says_end, "hair_03_end HairNub Bip001_Ponytail1Nub tail_tip leaf_1".split()))
+    assert not any(map(says_end, "endless_1 tipped_hair_2 leafy_L nubs_1 hair_03".split()))
+    assert all(map(says_twist, "upperarm_twist_01_l LeftForeArmTwist arm_twst lowerarm_roll".split()))
+    assert not any(map(says_twist, "roller_1 hair_rolled_2 neck".split()))
