@@ -174,6 +174,8 @@ def test_a_groom_in_a_variant_that_is_not_chosen_is_named(tmp_path):
         style.SetVariantSelection(name)
         with style.GetVariantEditContext():
             stage.OverridePrim("/Hero/Hair").SetActive(name == "long")
+    stage.GetRootLayer().subLayerPaths.append("gone.usda")
+    UsdGeom.NurbsCurves.Define(stage, "/Hero/Control")
     stage.Save()
     with pytest.raises(NeuralocksError, match="choose variant 'long' of 'hair' on /Hero, which has /Hero/Hair"):
         read_shot(path)
@@ -191,6 +193,7 @@ def test_what_is_switched_off_is_named(tmp_path, prim):
     assert any("is inactive" in line for line in inspect(path)["stops"])
     stage.GetPrimAtPath(prim).SetActive(True)
     stage.GetPrimAtPath("/Hero").SetSpecifier(Sdf.SpecifierClass)
+    stage.GetRootLayer().subLayerPaths.append("gone.usda")  # which is less likely to hold it
     stage.Save()
     with pytest.raises(
         NeuralocksError, match="holds no groom .*; /Hero/Hair is part of a class: let a prim inherit that"

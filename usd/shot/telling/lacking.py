@@ -25,11 +25,12 @@ def no_groom(
 ) -> NeuralocksError:
     """The error for a stage without BasisCurves; `otherwise` is the remedy if nothing in it is likely to be hair."""
     other = next((prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Curves)), None)
-    switched_off = _switched_off(stage, UsdGeom.BasisCurves)
-    remedy = _in_a_variant(stage) or switched_off or _on_joints(stage)
-    if other and not switched_off:
+    if other:
         remedy = f"convert the {other.GetTypeName()} {other.GetPath()}, if they are hair, to BasisCurves"
-    return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy or otherwise)
+    else:
+        remedy = _on_joints(stage) or otherwise
+    there = _in_a_variant(stage) or _switched_off(stage, UsdGeom.BasisCurves)
+    return nothing_found(stage, path, "groom (no BasisCurves prim)", remedy, there)
 
 
 def no_skeleton(stage: Usd.Stage, path: Path) -> NeuralocksError:
@@ -39,12 +40,14 @@ def no_skeleton(stage: Usd.Stage, path: Path) -> NeuralocksError:
         remedy = (
             "if it holds hair alone, sublayer or reference it in the shot of its character, on the head; else " + remedy
         )
-    return nothing_found(stage, path, "UsdSkel skeleton", _switched_off(stage, UsdSkel.Skeleton) or remedy)
+    return nothing_found(stage, path, "UsdSkel skeleton", remedy, _switched_off(stage, UsdSkel.Skeleton))
 
 
-def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str) -> NeuralocksError:
-    """The error for a stage that lacks what a bake needs; if layers are missing, it names them as the likely cause."""
-    return NeuralocksError(f"{path}: holds no {what}; {uncomposed(stage) or remedy}")
+def nothing_found(stage: Usd.Stage, path: Path, what: str, remedy: str, there: str = "") -> NeuralocksError:
+    """The error for a stage that lacks what a bake needs. What is `there`, but not in use, is told first; then, as a likelier cause than
+    that of the `remedy`, that layers are missing.
+    """
+    return NeuralocksError(f"{path}: holds no {what}; {there or uncomposed(stage) or remedy}")
 
 
 def has_hair_joints(prim: Usd.Prim) -> bool:
