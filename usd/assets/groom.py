@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write grooms as USD BasisCurves with the attributes that other tools read."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.groom import Groom
 from neuralocks_core.strands.strand_set import root_uv
 
-from ..baking.layer.header import RANGE, write_header
+from ..baking.layer.header import RANGE, over_prim, write_header
 from ..border.arrays import floats, integers, row_matrix
 from ..border.stage_files import write_stage
 from ..shot.strands.curve_ends import Beyond
@@ -48,10 +48,12 @@ class Over:
     Attributes:
         rig: the character with the hair.
         path: its file.
+        replaced: curves in it that the grooms replace; they are inactive in the new file.
     """
 
     rig: StageRig
     path: Path
+    replaced: list[Usd.Prim] = field(default_factory=list)
 
     @property
     def stage(self) -> Usd.Stage:
@@ -60,13 +62,13 @@ class Over:
 
     def notes(self) -> list[str]:
         """The note on hair that the file has already, which new hair does not replace."""
-        there = find_curves(self.stage)
+        there = [prim for prim in find_curves(self.stage) if prim not in self.replaced]
         if not there:
             return []
         more = f" and {len(there) - 1} more" if len(there) > 1 else ""
         return [
-            f"{there[0].GetPath()}{more}: {self.path.name} has this hair already, and a bake moves it beside the new; deactivate "
-            "it if the new hair replaces it"
+            f"{there[0].GetPath()}{more}: {self.path.name} has this hair already, and a bake moves it beside the new; if the new hair "
+            f"replaces it, add --replace {there[0].GetPath()}"
         ]
 
     def finish(self, layer: Sdf.Layer, out: Path) -> None:
@@ -76,6 +78,8 @@ class Over:
         for name in RANGE:
             if not self.stage.HasAuthoredMetadata(name):  # a range here would hide what animates the character later
                 layer.pseudoRoot.ClearInfo(name)
+        for prim in self.replaced:
+            over_prim(layer, prim).active = False
 
 
 def write_groom(path, groom: Groom, rig: StageRig | None = None, over: Over | None = None) -> Path:

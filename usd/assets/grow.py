@@ -22,6 +22,7 @@ from neuralocks_core.progress import Progress, silent, within
 
 from ..border.stage_files import check_layer_name, check_not_input, check_not_over
 from ..shot.stage import read_rigs
+from ..shot.strands.curves import find_curves
 from ..shot.telling.notes import first_of, unlikely_head
 from ..skel.stage_rig import StageRig
 from .groom import Over, write_groom
@@ -44,6 +45,7 @@ def grow(
     skeleton: str | None = None,
     head: str | None = None,
     with_character: bool = False,
+    replaced=None,
     tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> Path:
@@ -58,6 +60,7 @@ def grow(
         variation: number of a variation of the style, cut, parted, waved and laid differently; 0 is the style itself.
         skeleton, head: as for `bake`.
         with_character: write a layer over the character's file, which can be opened and baked as it is.
+        replaced: prim paths of hair in that file that the new hair replaces: it is inactive in the layer.
         tell: called with notes for the user.
         progress: called with (done, total, message).
 
@@ -67,7 +70,7 @@ def grow(
     out, with_character = as_path(out, "out"), flag("--with-character", with_character)
     check_layer_name(out)
     check_style(style, count, variation, seed)
-    rig, over, notes = whose_head(character, skeleton, head, out, with_character)
+    rig, over, notes = whose_head(character, skeleton, head, out, with_character, replaced)
     check_writable(out)
     if tell:
         tell(notes)
@@ -79,18 +82,24 @@ def grow(
 
 
 def whose_head(
-    character, skeleton: str | None, head: str | None, out: Path, with_character: bool
+    character, skeleton: str | None, head: str | None, out: Path, with_character: bool, replaced
 ) -> tuple[StageRig, Over | None, list[str]]:
     """The character that gets hair, what the hair is written over, if anything, and what a user should know of both.
 
     Args:
-        character, skeleton, head, with_character: as for `grow`.
+        character, skeleton, head, with_character, replaced: as for `grow`.
         out: checked not to be one of the character's files.
     """
+    if replaced and not with_character:
+        raise NeuralocksError(
+            "--replace: only a layer over the character's file replaces hair in it; add --with-character"
+        )
     rigs = read_rigs(character, skeleton, head)
     rig = rigs[0]
-    (check_not_over if with_character else check_not_input)(out, rig.joints.prim.GetStage())
-    over = Over(rig, as_path(character, "character")) if with_character else None
+    stage, over = rig.joints.prim.GetStage(), None
+    (check_not_over if with_character else check_not_input)(out, stage)
+    if with_character:
+        over = Over(rig, as_path(character, "character"), find_curves(stage, replaced) if replaced else [])
     return rig, over, [*first_of(rigs), *rig.notes, *unlikely_head(rig), *(over.notes() if over else [])]
 
 

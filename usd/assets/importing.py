@@ -41,6 +41,7 @@ def import_groom(
     skeleton: str | None = None,
     head: str | None = None,
     with_character: bool = False,
+    replaced=None,
     progress: Progress | None = None,
 ) -> tuple[list[Groom], list[str]]:
     """Read hair files (TressFX, .hair, .data, .bin, USD curves) and write them as USD grooms.
@@ -54,7 +55,7 @@ def import_groom(
             given, it gets the head's size, too.
         grooms: prim paths of the wanted grooms of USD files; all hair if left out.
         skeleton, head: as for `bake`, of the character on whose head the hair is put.
-        with_character: write a layer over the character's file, which can be opened and baked as it is.
+        with_character, replaced: as for `grow`.
         progress: called with (done, total, message).
 
     Returns:
@@ -67,7 +68,8 @@ def import_groom(
     out, rig, over, notes, found = as_path(out, "out"), None, None, [], []
     check_layer_name(out)
     with_character = flag("--with-character", with_character)
-    for option, value in (("with-character", with_character), ("skeleton", skeleton), ("head", head)):
+    given = {"with-character": with_character, "skeleton": skeleton, "head": head, "replace": replaced}
+    for option, value in given.items():
         if value and character is None:
             raise NeuralocksError(f"--{option}: there is no character; name one with --character")
     if grooms and not any(path.suffix.lower() in (*USD, *OTHERS) for path in sources):
@@ -76,7 +78,7 @@ def import_groom(
     say = progress or silent
     if character is not None:
         say(0, 1000, "looking at the head")
-        rig, over, notes = whose_head(character, skeleton, head, out, with_character)
+        rig, over, notes = whose_head(character, skeleton, head, out, with_character, replaced)
     counted, told = (unit, []) if unit is not None else _common_unit(sources, rig is not None)
     notes += told
     for number, path in enumerate(sources):

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .command import note, print_json, say
-from .options import AsJson, Grooms, Head, Out, Seed, Skeleton, WithCharacter, numbers
+from .options import AsJson, Grooms, Head, Out, Replaced, Seed, Skeleton, WithCharacter, numbers
 
 
 def import_command(
@@ -35,6 +35,7 @@ def import_command(
     skeleton: Skeleton = None,
     head: Head = None,
     with_character: WithCharacter = False,
+    replace: Replaced = None,
     as_json: AsJson = False,
 ) -> None:
     """Write hair files as USD grooms, as they are or on the head of a character."""
@@ -46,7 +47,7 @@ def import_command(
         grooms, notes = import_groom(
             files, out, unit, up,
             character=character, grooms=groom or None, skeleton=skeleton, head=head, with_character=with_character,
-            progress=progress,
+            replaced=replace or None, progress=progress,
         )  # fmt: skip
     note(notes)
     if as_json:
@@ -69,6 +70,7 @@ def grow_command(
     skeleton: Skeleton = None,
     head: Head = None,
     with_character: WithCharacter = False,
+    replace: Replaced = None,
 ) -> None:
     """Grow a hairstyle on a character and write it as a USD groom."""
     from ..assets.grow import grow
@@ -77,7 +79,8 @@ def grow_command(
     with progress_bar("growing") as progress:
         path = grow(
             style, character, out, count, seed,
-            variation=variation, skeleton=skeleton, head=head, with_character=with_character, tell=note, progress=progress,
+            variation=variation, skeleton=skeleton, head=head, with_character=with_character, replaced=replace or None,
+            tell=note, progress=progress,
         )  # fmt: skip
     say(str(path))
 

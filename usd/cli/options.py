@@ -27,6 +27,12 @@ WithCharacter = Annotated[
         help="Write a layer over the character's file, to be opened and baked as it is (with the same --skeleton).",
     ),
 ]
+Replaced = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--replace", help="With --with-character: prim path of hair that the new hair replaces; repeat for more."
+    ),
+]
 Joints = Annotated[
     list[str] | None,
     typer.Option("--joint", help="MEANING=JOINT, such as left_upper_arm=arm_L, if names do not tell; repeat for more."),

@@ -154,6 +154,38 @@ def test_a_layer_over_the_character_bakes_as_it_is(tmp_path, model, foreign):
     assert np.linalg.norm(world_points(out, 1.0, "/Groom_2/Bob") - head, axis=1).max() < 0.5
 
 
+def test_hair_that_is_replaced_is_off_in_the_layer_alone(tmp_path, foreign, capsys):
+    """Also within an instance, in which nothing can be changed."""
+    path = write_shot(tmp_path)
+    shot = tmp_path / "instance.usda"
+    stage = Usd.Stage.CreateNew(str(shot))
+    stage.DefinePrim("/Cast/Hero").GetReferences().AddReference(str(path), "/Hero")
+    stage.GetPrimAtPath("/Cast/Hero").SetInstanceable(True)
+    stage.SetMetadata("startTimeCode", 1), stage.SetMetadata("endTimeCode", 9)
+    stage.Save()
+    for file, hair, words in (
+        (shot, "/Cast/Hero/Hair", ("grow", "bob", "--count", "30")),
+        (path, "/Hero/Hair", ("import", str(foreign))),
+    ):
+        out = tmp_path / f"{file.stem}_new.usda"
+        assert status(*words, "--character", str(file), "--with-character", "--replace", hair, "-o", str(out)) == 0
+        assert {item.path.split("/")[1] for item in read_shot(out).grooms} == {"Groom"}
+        assert {item.path for item in read_shot(file).grooms} == {hair}
+    assert "has this hair already" not in capsys.readouterr().err
+    for wrong, told in (
+        (
+            {"with_character": True, "replaced": "/Hero/Wig"},
+            "/Hero/Wig: no such prim; the stage's grooms are: /Hero/Hair",
+        ),
+        ({"replaced": "/Hero/Hair"}, "--replace: only a layer .* add --with-character"),
+    ):
+        with pytest.raises(NeuralocksError, match=told):
+            grow("bob", path, tmp_path / "no.usda", count=30, **wrong)
+    with pytest.raises(NeuralocksError, match="--replace: there is no character"):
+        import_groom(foreign, tmp_path / "no.usda", replaced="/Hero/Hair")
+    assert not (tmp_path / "no.usda").exists()
+
+
 def test_what_cannot_be_put_on_a_head_is_refused(tmp_path, foreign):
     shot = write_shot(tmp_path, Recipe(bound="none"))
     before = shot.read_bytes()
