@@ -267,6 +267,32 @@ def test_leaps_are_told_by_their_frames():
     assert leaps_told(still, who, frames) == ()
 
 
+def test_a_path_strays_from_what_it_follows_most_closely():
+    """What a scale of zero hides in the first frame is not followed."""
+    times = np.linspace(0, 1, 9)
+    walking, turning = np.tile(np.eye(4), (2, 9, 1, 1))
+    walking[:, 0, 3] = times
+    turning[:, :3, :3] = from_vector(times[:, None] * [0, 0, 1.0])
+    path = np.array([0.5, 0, 0]) + times[:, None] * [1.0, 0.02, 0]
+    assert following.strays(path, [turning, walking]) == pytest.approx(0.02)
+    gone = walking.copy()
+    gone[0, :3, :3] = 0
+    assert following.strays(path, [gone, turning]) == following.strays(path, [turning]) > 0.5
+    assert following.strays(path, [gone]) == 0
+
+
+@pytest.mark.parametrize(("far", "least"), [(0.0, 1e-4), (50.0, 5e-3), (200.0, 2e-2), (2e5, 0.4)])
+def test_the_farther_off_a_thing_is_the_less_exactly_it_follows(far, least):
+    """Blender's places are in single precision: a character kilometres off seems to tremble on its own bones."""
+    times, still = np.linspace(0, 1, 9), np.tile(np.eye(4), (9, 1, 1))
+    walking = still.copy()
+    walking[:, 0, 3] = far + times
+    for share, follows in ((0.8, True), (1.4, False)):
+        places = walking.copy()
+        places[4, 1, 3] += share * least
+        assert (following.on_joint(places, still, walking, np.eye(4)) is not None) == follows, share
+
+
 def test_a_motion_that_leaps_out_of_the_rest_pose_is_told_once():
     """As files from FBX begin; one that leaves the rest pose slowly is not told, nor one that starts anew there."""
     frames = np.arange(10, 58)
