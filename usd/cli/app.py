@@ -154,7 +154,7 @@ def evaluate_command(
 
 @command("preview")
 def preview_command(
-    baked: Annotated[Path, typer.Argument(help="A bake.")],
+    baked: Annotated[Path, typer.Argument(help="A bake; or a character with its groom, which is drawn stiff.")],
     out: Out,
     frames: Annotated[
         str | None,
@@ -175,7 +175,7 @@ def preview_command(
     skeleton: Skeleton = None,
     head: Head = None,
 ) -> None:
-    """Draw a bake: a strip of pictures (.png) or a clip (.mp4, .gif).
+    """Draw a bake, or a groom on its character: a strip of pictures (.png) or a clip (.mp4, .gif).
 
     If there are several characters, it draws the first one with hair, or the one that --groom or --skeleton names.
     """

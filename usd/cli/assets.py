@@ -58,7 +58,13 @@ def import_command(
 
 
 def grow_command(
-    style: Annotated[str, typer.Argument(help="A style of the procedural library; an unknown name lists them.")],
+    style: Annotated[
+        str,
+        typer.Argument(
+            help="A style of the procedural library: long_straight, wavy, bob, fringe, pixie, tight_curls, coils, afro, mohawk, "
+            "ponytail, braid or bun."
+        ),
+    ],
     character: Annotated[Path, typer.Option(help="USD character to grow it on.")],
     out: Out,
     count: Annotated[int, typer.Option(help="Strands, up to 150,000.")] = 10_000,

@@ -25,6 +25,18 @@ MOST_BODY_POINTS = 400_000
 """Largest number of body points drawn in a preview."""
 
 
+class NotBaked(NeuralocksError):
+    """No groom of a stage has samples.
+
+    Attributes:
+        shot: the stage.
+    """
+
+    def __init__(self, text: str, shot: Shot):
+        super().__init__(text)
+        self.shot = shot
+
+
 @dataclass(frozen=True)
 class Baked:
     """A stage whose grooms have point samples.
@@ -144,7 +156,8 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
     grooms have samples, those without are left out, with a note.
 
     Raises:
-        NeuralocksError: it cannot be read, or no groom has samples.
+        NotBaked: no groom has samples.
+        NeuralocksError: it cannot be read.
     """
 
     def read(head, cuts=None) -> Shot:
@@ -159,8 +172,8 @@ def read_baked(path, grooms=None, skeleton: str | None = None, head: str | None 
         shot = read(head, told)
     sampled = {item.path: UsdGeom.BasisCurves(item.prim).GetPointsAttr().GetTimeSamples() for item in shot.grooms}
     if not any(sampled.values()):
-        raise NeuralocksError(
-            f"{path}: its grooms have no animated points; bake it first: neuralocks bake {path} -o OUT.usdc"
+        raise NotBaked(
+            f"{path}: its grooms have no animated points; bake it first: neuralocks bake {path} -o OUT.usdc", shot
         )
     # Exporters write one sample for what stands still: next to moving hair, that is not a bake.
     least = min(2, max(len(codes) for codes in sampled.values()))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`neuralocks preview`: a picture strip or a clip of a bake, of strands or of mesh hair."""
+"""`neuralocks preview`: a picture strip or a clip of a bake, of strands or of mesh hair; of a groom, how it looks on the head."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -24,7 +24,8 @@ from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
 from ..shot.strands.curves import find_curves
 from ..shot.telling.notes import few
-from .baked import MOST_BODY_POINTS, Baked, read_baked
+from .baked import MOST_BODY_POINTS, Baked, NotBaked, read_baked
+from .groomed import as_groomed
 
 SIDES = 16, 4096
 """Least and largest width and height of a picture [pixels]."""
@@ -45,10 +46,11 @@ def preview(
     tell: Callable[[list[str]], None] | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Draw a bake without a display; mesh hair on joints where the stage has no strands.
+    """Draw a bake without a display; mesh hair on joints where the stage has no strands; hair that is not baked as it was groomed, in
+    the first frame if none is named.
 
     Args:
-        baked: path of the bake, or a `Baked` already read.
+        baked: path of the bake, or of a groom with its character, or a `Baked` already read.
         path: .png for a strip of pictures, .mp4 or .gif for a clip.
         grooms, skeleton, head: as for `bake`.
         frames: in time codes, for a strip `FIRST:LAST[:STEP]`, of which it shows six if they are more than twelve, for a clip
@@ -60,7 +62,7 @@ def preview(
         progress: called with (done, total, message).
 
     Raises:
-        NeuralocksError: the file is not a bake, an argument cannot be used, or the picture cannot be made.
+        NeuralocksError: the file has no hair on a character, an argument cannot be used, or the picture cannot be made.
     """
     _check_size(size)
     check_number("--view", view, -360, 360)
@@ -68,7 +70,14 @@ def preview(
     if isinstance(baked, Baked):
         scene, border = _strands(baked, tell)
     else:
-        scene, border = _scene(baked, grooms, skeleton, head, tell)
+        try:
+            scene, border = _scene(baked, grooms, skeleton, head, tell)
+        except NotBaked as error:
+            groomed = as_groomed(error.shot)
+            scene, border = _strands(groomed, tell)
+            frames = f"{groomed.codes[0]:.15g}" if frames is None else frames
+            if tell:
+                tell([f"{baked}: its hair is not baked, so it is drawn as it was groomed, stiff on the head"])
     with deferred():  # drawing may load modules at any time; progress checks after each picture
         return drawing.render(
             scene,
@@ -102,7 +111,7 @@ def _samples(frames: str | None, times: np.ndarray, border: Border, path: Path) 
     first, last = border.time_codes(times[[0, -1]])
     wanted = np.array(time_codes(frames, first, last, frame=border.frame))
     if wanted[0] < first - border.frame / 2 or wanted[-1] > last + border.frame / 2:
-        raise NeuralocksError(f"--frames {frames}: the bake has frames {first:g} to {last:g}; choose from these")
+        raise NeuralocksError(f"--frames {frames}: its frames are {first:g} to {last:g}; choose from these")
     return np.unique(drawing.nearest(times, border.seconds(wanted)))
 
 

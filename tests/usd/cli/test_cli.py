@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import typer
 
+from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.json_values import plain
 from neuralocks_core.models import model_file
 from neuralocks_core.preview.pictures import CLIP_SIZE, STRIP_SIZE
@@ -109,6 +110,13 @@ def test_help_breaks_its_lines_where_the_terminal_ends(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     assert status("bake", "--help") == 0
     assert "mute it to get the shot back. To resume a bake that was stopped, give" in capsys.readouterr().out
+
+
+def test_help_tells_all_styles(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "400")
+    assert status("grow", "--help") == 0
+    *others, last = STYLES
+    assert f"procedural library: {', '.join(others)} or {last}." in capsys.readouterr().out
 
 
 def test_help_tells_the_sizes_of_pictures(capsys, monkeypatch):

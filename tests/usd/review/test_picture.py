@@ -5,7 +5,7 @@ import inspect
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
@@ -14,7 +14,7 @@ from usd.review import baked as reading
 from usd.review import picture
 from usd.review.baked import read_baked
 
-from ..shots import Recipe, write_shot
+from ..shots import Recipe, world_points, write_shot
 
 
 def test_it_tells_whose_hair_is_not_drawn(tmp_path, monkeypatch):
@@ -75,6 +75,26 @@ def test_a_hidden_character_is_not_said_to_be_drawn(tmp_path, monkeypatch):
     assert told == ["/Bert/Rig: one of 2 characters is drawn; choose another, such as /Anna/Rig, with --skeleton PRIM"]
 
 
+@pytest.mark.parametrize("recipe", [Recipe(bound="own", strands=4), Recipe(bound="own", strands=4, unit=0.01, up="Z")])
+def test_hair_that_is_not_baked_is_drawn_as_it_was_groomed(tmp_path, monkeypatch, recipe):
+    """Where USD's own skinning puts it; in the first frame, unless others are asked for."""
+    scenes, named, told, path = [], [], [], write_shot(tmp_path, recipe)
+    monkeypatch.setattr(picture.drawing, "_strip", lambda part, images, names: (named.extend(names), part.touch()))
+    drawn = picture.drawing.render
+    monkeypatch.setattr(picture.drawing, "render", lambda scene, *a, **k: (scenes.append(scene), drawn(scene, *a, **k)))
+    picture.preview(path, tmp_path / "first.png", size=(32, 40), tell=told.extend)
+    picture.preview(path, tmp_path / "some.png", size=(32, 40), frames="3:5")
+    assert named == ["frame 1", "frame 3", "frame 4", "frame 5"]
+    assert told == [f"{path}: its hair is not baked, so it is drawn as it was groomed, stiff on the head"]
+    stage = Usd.Stage.Open(str(path))
+    UsdSkel.BakeSkinning(stage.Traverse())
+    stage.Export(str(tmp_path / "skinned.usda"))
+    for code in (1, 5):
+        skinned = world_points(tmp_path / "skinned.usda", code)
+        np.testing.assert_allclose(scenes[0].hair(code - 1), skinned, atol=1e-5)
+    assert np.abs(scenes[0].hair(4) - scenes[0].hair(0)).max() > 0.01
+
+
 @pytest.fixture(scope="module")
 def hair(tmp_path_factory):
     """A bake of frames 5 to 12, with motion blur."""
@@ -129,7 +149,7 @@ def test_a_turntable_goes_once_round_a_single_frame_and_shows_other_sides(hair, 
 
 
 def test_frames_that_the_bake_lacks_and_sizes_that_nobody_draws_are_refused(hair, tmp_path):
-    with pytest.raises(NeuralocksError, match="--frames 1:7: the bake has frames 5 to 12.5; choose from these"):
+    with pytest.raises(NeuralocksError, match="--frames 1:7: its frames are 5 to 12.5; choose from these"):
         picture.preview(hair, tmp_path / "hair.png", frames="1:7")
     with pytest.raises(NeuralocksError, match="--size 90000: must be a whole number from 16 to 4096"):
         picture.preview(hair, tmp_path / "hair.png", size=(64, 90000))
