@@ -26,6 +26,7 @@ class Groomed(Baked):
         return []
 
 
-def as_groomed(shot: Shot) -> Groomed:
-    """The frames of a shot in which no groom has samples."""
-    return Groomed(shot, np.array(time_codes(None, shot.first, shot.last, frame=shot.border.frame)))
+def as_groomed(shot: Shot, first_alone: bool) -> Groomed:
+    """The frames of a shot in which no groom has samples, or the first one alone."""
+    codes = [shot.first] if first_alone else time_codes(None, shot.first, shot.last, frame=shot.border.frame)
+    return Groomed(shot, np.array(codes))

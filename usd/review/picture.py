@@ -73,9 +73,7 @@ def preview(
         try:
             scene, border = _scene(baked, grooms, skeleton, head, tell)
         except NotBaked as error:
-            groomed = as_groomed(error.shot)
-            scene, border = _strands(groomed, tell)
-            frames = f"{groomed.codes[0]:.15g}" if frames is None else frames
+            scene, border = _strands(as_groomed(error.shot, first_alone=frames is None), tell)
             if tell:
                 tell([f"{baked}: its hair is not baked, so it is drawn as it was groomed, stiff on the head"])
     with deferred():  # drawing may load modules at any time; progress checks after each picture
