@@ -17,7 +17,7 @@ from ..objects.lookup import find
 from ..objects.settings import as_set, settings_of
 from .rigging import unreported
 
-MOST_KEYS, MOST_VERTICES = 200_000, 10_000
+MOST_KEYS, MOST_VERTICES = 150_000, 10_000
 """More than these are not compared, and count as changed: undoing something else should not block Blender."""
 KEY = {"co": 2, "handle_left": 2, "handle_right": 2, "amplitude": 1, "back": 1, "period": 1}
 CHOICES = ("interpolation", "easing")
