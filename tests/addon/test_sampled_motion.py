@@ -2,20 +2,17 @@
 """The motion that the add-on samples, without Blender: what is stored of it, found by frame, and read of it."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dcc_addon.services.hair.history import SampledBoundary
 from dcc_addon.services.rigs import following, rig
-from dcc_addon.services.rigs.leaps import leaps_told
 from dcc_addon.services.rigs.motion import Motion, frame_numbers, similar
-from neuralocks_core.animation.cuts import find_cuts
 from neuralocks_core.boundary.history import BoundarySampler
 from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.motion import Clip, loop_turns
+from neuralocks_core.motion import loop_turns
 from neuralocks_core.rotation import from_vector
 from tests.addon.few_bones import BONES, PARENTS, PLACES, rest
 from tests.core.rigs import moved, person
@@ -247,26 +244,6 @@ def test_frame_numbers():
         frame_numbers(2, 1, 1)
 
 
-def test_leaps_are_told_by_their_frames():
-    """A cut, and two jumps in succession that are not cuts."""
-    frames = np.arange(10, 74)
-    joints = np.tile(np.eye(4), (64, 1, 1, 1))
-    joints[:, 0, 1, 3] = 0.01 * np.sin(np.arange(64))
-    for first in (20, 50, 54):
-        joints[first:, 0, 0, 3] += 1.0
-    clip = Clip(frames / 24, joints)
-    clip = replace(clip, cuts=find_cuts(clip, 0))
-    who = SimpleNamespace(head=0, humanoid={}, skeleton=SimpleNamespace(bind=joints[0]))
-    cut, flash = leaps_told(clip, who, frames)
-    assert cut == "The head jumps to another place at frame 30: hair starts anew there"
-    assert flash.startswith("The head jumps at frame 60, 64, less than 0.2 s from one jump to the next")
-    still = Clip(frames / 24, np.tile(np.eye(4), (64, 1, 1, 1)))
-    for many, named in ((6, "10, 18, 26, 34, 42, 50:"), (7, "10, 18, 26, 34, 42, 50, ...:")):
-        (cut,) = leaps_told(replace(still, cuts=still.times[: 8 * many : 8]), who, frames)
-        assert named in cut
-    assert leaps_told(still, who, frames) == ()
-
-
 def test_a_path_strays_from_what_it_follows_most_closely():
     """What a scale of zero hides in the first frame is not followed."""
     times = np.linspace(0, 1, 9)
@@ -291,18 +268,3 @@ def test_the_farther_off_a_thing_is_the_less_exactly_it_follows(far, least):
         places = walking.copy()
         places[4, 1, 3] += share * least
         assert (following.on_joint(places, still, walking, np.eye(4)) is not None) == follows, share
-
-
-def test_a_motion_that_leaps_out_of_the_rest_pose_is_told_once():
-    """As files from FBX begin; one that leaves the rest pose slowly is not told, nor one that starts anew there."""
-    frames = np.arange(10, 58)
-
-    def leaps(turns, cuts=()) -> tuple[str, ...]:
-        clip = moved(frames / 24, head_turn=lambda _: from_vector(turns[:, None] * [1.0, 0, 0]))
-        return leaps_told(replace(clip, cuts=np.array(cuts)), person(), frames)
-
-    goes_on = np.radians(np.append(0.0, 40 + 15 * np.sin(np.arange(47) / 6)))
-    (told,) = leaps(goes_on)
-    assert told.startswith("The motion leaps out of the rest pose at frame 11 and flings the hair")
-    assert leaps(np.radians(40) * np.sin(np.arange(48) / 24)) == ()
-    assert [each.startswith("The head jumps") for each in leaps(goes_on, [11 / 24])] == [True]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core.errors import CannotWrite, NeuralocksError
-from usd.baking.layer.spool import Spool, _remove, fingerprint
+from usd.baking.layer.spool import Spool, _remove, fingerprint, program_files
 
 
 def read(spool, code, rows, batch=0):
@@ -218,3 +218,9 @@ def test_a_write_protected_output_is_refused_before_any_frame(tmp_path):
     with pytest.raises(CannotWrite, match="hair.usdc: is write-protected; make it writable"):
         Spool(out, "x")
     assert list(tmp_path.iterdir()) == [out] and out.read_bytes() == b"published"
+
+
+def test_all_files_of_the_program_tell_its_version():
+    root = Path(__file__).parents[3]
+    found = {file.relative_to(root).as_posix() for file in program_files()}
+    assert found >= {"usd/__init__.py", "usd/shot/carriers/seat.py", "neuralocks_core/deformation/clumping.py"}
