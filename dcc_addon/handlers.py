@@ -10,7 +10,6 @@ from . import background
 from .live import model_updates, view
 from .live.live_strands import show_all_rest, show_rest_left
 from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
-from .scene.baked import as_groomed
 from .scene.baked.attach import switch_changed
 from .scene.character.layers import working_in
 from .scene.drawing.last_called import go_last, others_called
@@ -120,7 +119,6 @@ def before_save(target=None, *_):
     session.saving.blurred = blur.end()
     model_updates.remember()
     make_comparable(bpy.data.objects)
-    as_groomed.keep(bpy.data.objects)
     for scene in bpy.data.scenes:
         view.show_rest(scene)
     show_all_rest()

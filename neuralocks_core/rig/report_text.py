@@ -52,6 +52,6 @@ def report_lines(report: dict) -> list[str]:
 
 
 def _work(cost: dict) -> str:
-    history = cost.get("history_multiply_adds")  # cards of older models count the network alone
-    of = {0: "", None: " without a history"}.get(history, f" of the network and {history} of the history")
+    history = cost["history_multiply_adds"]
+    of = f" of the network and {history} of the history" if history else ""
     return f"{cost['multiply_adds']} multiply-adds{of}"

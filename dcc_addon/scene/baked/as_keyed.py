@@ -9,8 +9,6 @@ from . import as_baked, as_carried
 
 KEY = "neuralocks_keyed"
 """The property of the action: a number for each part."""
-FEWEST = 7
-"""Parts that every record has."""
 REMEDY = "Bake to Keyframes"
 
 
@@ -30,7 +28,7 @@ def note(armature, scene) -> str:
     if armature.neuralocks_character.rig_live:
         return ""
     told = hair_keys.stored(armature, KEY)
-    parts = [] if told is None else recorded.changed(told, _numbers(armature, scene), FEWEST)
+    parts = [] if told is None else recorded.changed(told, _numbers(armature, scene))
     return recorded.note(parts, REMEDY) if parts else ""
 
 

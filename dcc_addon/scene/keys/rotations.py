@@ -61,9 +61,9 @@ def give_back(armature, text: str, keyed: bool = False, without=()) -> None:
     Blender's Bake Action does, are left to it, except that of NLA tracks of the names `without`.
     """
     found, written = kept_in(text), animated(armature.animation_data, without) if keyed else set()
-    for name, (mode, quaternion, euler, axis_angle, *more) in found.items():
-        bone = _bone(armature, name, more, found) if armature.pose else None
-        if bone is not None and (since := _written_since(bone, mode, more, written)):
+    for name, (mode, quaternion, euler, axis_angle, place, modes) in found.items():
+        bone = _bone(armature, name, place, found) if armature.pose else None
+        if bone is not None and (since := _written_since(bone, mode, modes, written)):
             bone.rotation_mode = since
         elif bone is not None:
             bone.rotation_mode = mode  # first, because it converts the values from the previous mode
@@ -73,12 +73,15 @@ def give_back(armature, text: str, keyed: bool = False, without=()) -> None:
 
 
 def _fits(values: list) -> bool:
-    """Whether `kept` writes such values of a bone; older files lack its place, or modes."""
+    """Whether `kept` writes such values of a bone."""
+    if len(values) != len(KEPT) + 2:
+        return False
+    mode, *numbers, modes = values
     return (
-        4 <= len(values) <= 6
-        and values[0] in MODES
-        and all(are_numbers(numbers, count) for numbers, count in zip(values[1:5], (4, 3, 4, 6)))
-        and all(isinstance(modes, list) and set(map(str, modes)) <= set(CHANNELS) for modes in values[5:])
+        mode in MODES
+        and all(map(are_numbers, numbers, (4, 3, 4, 6)))
+        and isinstance(modes, list)
+        and set(map(str, modes)) <= set(CHANNELS)
     )
 
 
@@ -87,9 +90,9 @@ def _modes(bone, written: set[str]) -> list[str]:
     return [mode for mode, channel in CHANNELS.items() if bone.path_from_id(channel) in written]
 
 
-def _written_since(bone, mode: str, more: list, written: set[str]) -> str:
-    """The mode in which animation turns a bone that it did not turn when it was stored; empty if there is none."""
-    then, found = (more[1] if len(more) > 1 else list(CHANNELS)), _modes(bone, written)
+def _written_since(bone, mode: str, then: list[str], written: set[str]) -> str:
+    """The mode in which animation, which then wrote others, turns a bone that it did not turn; empty if there is none."""
+    found = _modes(bone, written)
     plays = mode in found or (mode not in CHANNELS and "XYZ" in found)  # all orders of Euler angles share one channel
     return "" if plays else next((each for each in found if each not in then), "")
 
@@ -99,13 +102,13 @@ def _place(bone) -> list[float]:
     return [*bone.bone.head_local, *bone.bone.tail_local]
 
 
-def _bone(armature, name: str, place: list, found: dict):
+def _bone(armature, name: str, place: list[float], found: dict):
     """The bone of this name; otherwise, since it may have been renamed, the only bone at `place` whose name is not in `found`."""
     bones = armature.pose.bones
-    if name in bones or not place:
-        return bones.get(name)
+    if name in bones:
+        return bones[name]
     others = [bone for bone in bones if bone.name not in found]
-    there = [bone for bone in others if np.abs(np.subtract(_place(bone), place[0])).max() < SAME_PLACE]
+    there = [bone for bone in others if np.abs(np.subtract(_place(bone), place)).max() < SAME_PLACE]
     return there[0] if len(there) == 1 else None
 
 

@@ -12,20 +12,18 @@ def number_of(found) -> int:
 
 
 def as_text(numbers: dict[str, int | None]) -> str:
-    """What is stored: the numbers in their order, a dash for what is unknown. Parts that are added go last, so that older records can
-    be read.
-    """
+    """What is stored: the numbers in their order, a dash for what is unknown."""
     return " ".join("-" if number is None else f"{number:08x}" for number in numbers.values())
 
 
-def changed(told, now: dict[str, int | None], fewest: int) -> list[str]:
-    """Which parts have other numbers `now` than in `told`, which may lack the last ones; none if it has not even the `fewest`, and so
-    is something else. What is unknown counts as the same.
+def changed(told, now: dict[str, int | None]) -> list[str]:
+    """Which parts have other numbers `now` than in `told`; none if that does not hold a number of each, and so is something else. What
+    is unknown counts as the same.
     """
     then, today = str(told).split(" "), as_text(now).split(" ")
-    if not fewest <= len(then) <= len(now):
+    if len(then) != len(now):
         return []
-    return [part for part, old, new in zip(now, then, today) if old != new and "-" not in (old, new)]
+    return [part for part, old, new in zip(now, then, today, strict=True) if old != new and "-" not in (old, new)]
 
 
 def note(parts: list[str], remedy: str) -> str:

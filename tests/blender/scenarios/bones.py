@@ -181,6 +181,7 @@ def forged_memories(folder: Path) -> None:
     own, first, second = rig.neuralocks_character, rig.pose.bones["hair.01"], rig.pose.bones["hair.02"]
     give_bone_model(rig, folder)
     whole = [[0.9, 0.3, 0.1, -0.3], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
+    place = [0.0] * 6
     first.rotation_mode = second.rotation_mode = "QUATERNION"
     first.rotation_quaternion = whole[0]
     rest = bones_at(rig, 12)
@@ -188,12 +189,13 @@ def forged_memories(folder: Path) -> None:
         [],
         [[]],
         ["XYZ"],
-        ["ABC", *whole],
-        ["XYZ", *whole[1:], whole[0]],
-        ["XYZ", *whole, [{}]],
-        ["XYZ", *whole, [0.0] * 6, [3]],
+        ["XYZ", *whole],
+        ["ABC", *whole, place, []],
+        ["XYZ", *whole[1:], whole[0], place, []],
+        ["XYZ", *whole, [{}], []],
+        ["XYZ", *whole, place, [3]],
     ):
-        own.rig_kept = json.dumps({"hair.01": values, "hair.02": ["QUATERNION", *whole]})
+        own.rig_kept = json.dumps({"hair.01": values, "hair.02": ["QUATERNION", *whole, place, []]})
         own.rig_live = True
         bones_at(rig, 9)
         own.rig_live = False

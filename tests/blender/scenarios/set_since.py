@@ -2,14 +2,12 @@
 """What was set otherwise since hair was baked, or of another shape: the panel names it, as long as it is so."""
 
 import shutil
-import zlib
 from pathlib import Path
 from unittest import SkipTest
 
 import bpy
 
 from dcc_addon.scene.baked import as_groomed
-from dcc_addon.services.panel.sliders import SLIDERS
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, bones_at, choose, give_bone_model, make_live, needs_usd
 from tests.blender.panel import told_changed
@@ -17,7 +15,7 @@ from tests.blender.panel import told_changed
 
 def character_set_since(folder: Path) -> None:
     """If the Loop, Head Bone, its rest place, unit scale or body of attached hair becomes another, a note says so until it is as before, also when the
-    file is opened again. An older record, which lacks these, tells of nothing but its own parts.
+    file is opened again.
     """
     needs_usd()
     rig, strands = scenes.dancer(20, skinned=True)
@@ -92,63 +90,44 @@ def character_set_since(folder: Path) -> None:
         scene.collection.objects.link(each)
     body.vertex_groups[0].add(range(len(mesh.vertices)), 0.5, "REPLACE")
     assert told_changed() == ["body"]
-    _record_as_older(strands, 4)
-    own.loop = True
-    assert not told_changed()
     strands.location.x += 0.1
-    assert told_changed() == ["place"]
+    assert told_changed() == ["place", "body"]
     assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
-    own.loop = False
+    own.loop = True
     assert told_changed() == ["Loop"]
 
 
 def model_moved_since(folder: Path) -> None:
-    """Attached hair whose model is named from the file is told of another model, by what is in it, and not of a save in another folder; a
-    save also keeps caches that an older add-on attached, whose records name the model, from being told of one.
-    """
+    """Attached hair whose model is named from the file is told of another model, by what is in it, and not of a save in another folder."""
     needs_usd()
     shot, there, model = folder / "shot.blend", folder / "later", folder / "own.neuralocks"
     there.mkdir()
     shutil.copy(MODEL, model)
-    for parts in (None, 8, 4):
-        scenes.empty()
-        rig, strands = scenes.dancer(20, skinned=True)
-        bpy.ops.wm.save_as_mainfile(filepath=str(shot))
-        make_live(rig, strands)
-        own, scene = strands.neuralocks_hair, bpy.context.scene
-        own.live, own.model, scene.neuralocks.output = False, "//own.neuralocks", str(folder / "hair.usdc")
-        assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
-        if parts:
-            _record_as_older(strands, parts)
-        assert not told_changed()
-        bpy.ops.wm.save_as_mainfile(filepath=str(there / "shot.blend"))
-        assert own.model == "//../own.neuralocks" and not told_changed(), parts
-        bpy.ops.wm.open_mainfile(filepath=str(there / "shot.blend"))
-        own = bpy.data.objects["Hair"].neuralocks_hair
-        assert not told_changed(), parts
-        model.rename(folder / "away.neuralocks")
-        assert not told_changed(), "a model that is missing here is no other one"
-        (folder / "away.neuralocks").rename(model)
-        own.resolve = not own.resolve
-        assert told_changed() == ["sliders"]
-        own.resolve = not own.resolve
-        for other, what in (("", ["Model"]), (str(model), [])):
-            own.model = other
-            assert told_changed() == what
-
-
-def _record_as_older(strands, parts: int) -> None:
-    """Give attached hair the first parts of its record, as an add-on wrote it that told the model by its name."""
-    own = strands.neuralocks_hair
-    named = [*(round(getattr(own, slider.name), 6) for slider in SLIDERS), own.resolve, own.model]
-    told = strands["neuralocks_groomed"].split(" ")[:parts]
-    told[2] = f"{zlib.crc32(repr(named).encode()):08x}"
-    strands["neuralocks_groomed"] = " ".join(told)
+    rig, strands = scenes.dancer(20, skinned=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    make_live(rig, strands)
+    own, scene = strands.neuralocks_hair, bpy.context.scene
+    own.live, own.model, scene.neuralocks.output = False, "//own.neuralocks", str(folder / "hair.usdc")
+    assert bpy.ops.neuralocks.bake_attach() == {"FINISHED"} and not told_changed()
+    bpy.ops.wm.save_as_mainfile(filepath=str(there / "shot.blend"))
+    assert own.model == "//../own.neuralocks" and not told_changed()
+    bpy.ops.wm.open_mainfile(filepath=str(there / "shot.blend"))
+    own = bpy.data.objects["Hair"].neuralocks_hair
+    assert not told_changed()
+    model.rename(folder / "away.neuralocks")
+    assert not told_changed(), "a model that is missing here is no other one"
+    (folder / "away.neuralocks").rename(model)
+    own.resolve = not own.resolve
+    assert told_changed() == ["sliders"]
+    own.resolve = not own.resolve
+    for other, what in (("", ["Model"]), (str(model), [])):
+        own.model = other
+        assert told_changed() == what
 
 
 def keys_set_since(folder: Path) -> None:
     """If hair bones that have baked keys are set to another motion, or stand in another wind, a note says so until that is as before, the
-    bones are live, or the keys are off or made anew. Keys that an older add-on made tell of nothing.
+    bones are live, or the keys are off or made anew. Keys without a record tell of nothing.
     """
     rig = scenes.armature(bones=scenes.BONES + scenes.TAIL)
     scenes.dance(rig)
