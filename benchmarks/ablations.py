@@ -19,14 +19,14 @@ import torch
 
 from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.models.network_sizes import LOCK_CODES, PLAIN_STRAND, STRAND
-from neuralocks_core.training.beginning import kept_coder
+from neuralocks_core.training.data.farm import load
+from neuralocks_core.training.data.rollouts import RolloutMaker, TrainingScene
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.learning.methods import samples
 from neuralocks_core.training.learning.regression import RolloutBank, regress
 from neuralocks_core.training.learning.regression_options import RegressionOptions
-from neuralocks_core.training.material.farm import load
-from neuralocks_core.training.material.rollouts import RolloutMaker, TrainingScene
 from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.warm_start import kept_coder
 
 SPEC = BoundarySpec()
 ROWS = {

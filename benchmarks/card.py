@@ -4,7 +4,7 @@
     python benchmarks/card.py
 
 writes all of them: run it after a table was measured again, or a shipped model was made anew (`mean_model.py` and `livelier.py`
-empty the card's report). `MOVES` says which model moves which row: it is the one that `neuralocks_core/deformation/suited.py` gives
+empty the card's report). `MOVES` says which model moves which row: it is the one that `neuralocks_core/deformation/model_choice.py` gives
 that hair, as in the tables. The card also names what misses an aim. Only the report changes; the graphs stay the same, byte for byte.
 `neuralocks inspect MODEL` prints it.
 """

@@ -19,9 +19,9 @@ from quality import CHARACTER, Bench
 
 from neuralocks_core.animation.puppet import FRONT, SIDE, UP, Puppet, ease, noise
 from neuralocks_core.animation.random_motion import scripted_clip
+from neuralocks_core.deformation.model_choice import nearest
 from neuralocks_core.deformation.resolve import Resolver
 from neuralocks_core.deformation.strand_session import StrandSession
-from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.models.runtime import StrandModel
 
 STYLES = ("long_straight", "wavy", "fringe", "bob")

@@ -34,9 +34,9 @@ def livelier(model: Path, times: float, out: Path, damping: float = 1.0) -> Path
     """Write the model with `times` the weight of effective gravity's changes in its history, and `damping` that of damping."""
     from neuralocks_core.boundary.spec import BoundarySpec
     from neuralocks_core.models import model_file
-    from neuralocks_core.training.beginning import Beginning
     from neuralocks_core.training.export import strand_graphs
     from neuralocks_core.training.networks import StrandNet
+    from neuralocks_core.training.warm_start import Beginning
 
     meta = model_file.read(model, "strands").meta
     spec, training = BoundarySpec.from_json(meta["boundary"]), meta["training"]

@@ -22,16 +22,16 @@ import plain_errors  # noqa: F401
 
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.boundary.history import BoundarySampler
+from neuralocks_core.deformation.model_choice import nearest
 from neuralocks_core.deformation.strand_session import StrandSession
-from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.materials import RANGES, Material
 from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
 from neuralocks_core.reference import simulate
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
-from neuralocks_core.training.material.hair_body import hair_body, posed_over_time
-from neuralocks_core.training.material.rollouts import RolloutMaker, TrainingScene
+from neuralocks_core.training.data.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.data.rollouts import RolloutMaker, TrainingScene
 
 EVERY = ("shake", "turn", "walk", "jump", "nod", "bow")
 SHOWS = {

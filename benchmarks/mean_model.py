@@ -8,7 +8,7 @@ SHARE is the share of BEGUN, from 0 to 1. Both share their strand codes, which s
 take so many times the damping for what it is told: a model that learned from a solver whose steps damp, before it is mixed
 with one that did not. The card is that of BEGUN and says so, without the measurements of BEGUN. With `--without`, the card
 does not tell of the hair of some grooms, by their numbers in the training of BEGUN, from 0 on: for those that another shipped
-model moves better, so that hair like it does not get this one (`deformation/suited.py`); without all of it, the model is for
+model moves better, so that hair like it does not get this one (`deformation/model_choice.py`); without all of it, the model is for
 hair that is like none. With `--also`, it tells of the hair of some grooms in the card of another model, too, which this one
 moves as well: hair that it began with, or in place of that model.
 """
@@ -48,9 +48,9 @@ def mean(
     """
     from neuralocks_core.boundary.spec import BoundarySpec
     from neuralocks_core.models import model_file
-    from neuralocks_core.training.beginning import Beginning
     from neuralocks_core.training.export import strand_graphs
     from neuralocks_core.training.networks import StrandNet
+    from neuralocks_core.training.warm_start import Beginning
 
     meta = model_file.read(begun, "strands").meta
     spec = BoundarySpec.from_json(meta["boundary"])

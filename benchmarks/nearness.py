@@ -18,7 +18,7 @@ import quality
 
 from neuralocks_core import metrics
 from neuralocks_core.animation.random_motion import scripted_clip
-from neuralocks_core.deformation.suited import distances
+from neuralocks_core.deformation.model_choice import distances
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.models import model_file
 from neuralocks_core.models.runtime import StrandModel

@@ -37,16 +37,16 @@ from neuralocks_core import metrics
 from neuralocks_core.animation.gestures import FOREIGN, KINDS, WILD
 from neuralocks_core.animation.random_motion import scripted_clip
 from neuralocks_core.body.collider import Collider
+from neuralocks_core.deformation.model_choice import nearest
 from neuralocks_core.deformation.strand_session import StrandSession
-from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.materials import Material
 from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.reference import simulate, stateless_floor
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import strands_on
-from neuralocks_core.training.material.hair_body import hair_body, posed_over_time
-from neuralocks_core.training.material.mirror import POLAR, mirrored_strands, mirrored_vectors
-from neuralocks_core.training.material.rollouts import RolloutMaker, held_out_split
+from neuralocks_core.training.data.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.data.mirror import POLAR, mirrored_strands, mirrored_vectors
+from neuralocks_core.training.data.rollouts import RolloutMaker, held_out_split
 
 SEED = 7001
 STRANDS = 120

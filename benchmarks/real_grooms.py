@@ -62,7 +62,7 @@ def main() -> None:
 
 def rows(paths, model=None, frames=None, training: dict | None = None):
     """Yield the numbers of each file, by column; with `training`, those of a model trained for it."""
-    from neuralocks_core.deformation.suited import suited
+    from neuralocks_core.deformation.model_choice import suited
     from usd.baking.bake import bake
     from usd.models.train import train
     from usd.review.evaluate import evaluate

@@ -23,15 +23,15 @@ from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.models.network_sizes import LOCK_CODES
 from neuralocks_core.physics.bend_twist import Cosserat
 from neuralocks_core.strands.strand_set import StrandSet
-from neuralocks_core.training.beginning import kept_coder
+from neuralocks_core.training.data.farm import load
+from neuralocks_core.training.data.rollouts import RolloutMaker, TrainingScene
 from neuralocks_core.training.gauge import measure
 from neuralocks_core.training.learning.methods import MomentMethod
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.learning.regression import RolloutBank, predicted
 from neuralocks_core.training.learning.selfsupervised import paper_boundary
-from neuralocks_core.training.material.farm import load
-from neuralocks_core.training.material.rollouts import RolloutMaker, TrainingScene
 from neuralocks_core.training.networks import StrandNet
+from neuralocks_core.training.warm_start import kept_coder
 
 OURS, PAPER = SelfSupervisedOptions(), SelfSupervisedOptions.paper()
 

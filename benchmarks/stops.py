@@ -3,7 +3,7 @@
 
     python benchmarks/stops.py [--clips 400] [--seconds 3.63]
 
-Printed for clips of which none stops midway, and for as many as trainings have (`training/material/rollouts.py`). It takes seconds.
+Printed for clips of which none stops midway, and for as many as trainings have (`training/data/rollouts.py`). It takes seconds.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from quality import CHARACTER
 
 from neuralocks_core.animation.random_motion import random_clip
 from neuralocks_core.motion import Clip
-from neuralocks_core.training.material.rollouts import STOPS
+from neuralocks_core.training.data.rollouts import STOPS
 from usd.shot.stage import read_rigs
 
 STILL = 0.02

@@ -19,8 +19,8 @@ from rig_quality import EXAMPLE
 
 from neuralocks_core import metrics
 from neuralocks_core.animation.random_motion import scripted_clip
+from neuralocks_core.deformation.model_choice import nearest
 from neuralocks_core.deformation.strand_session import StrandSession
-from neuralocks_core.deformation.suited import nearest
 from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
 from neuralocks_core.reference import simulate

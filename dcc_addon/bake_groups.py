@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from neuralocks_core.errors import NeuralocksError
 
-from .live.blowing import blowing
+from .live.character_wind import blowing
 from .live.live_strands import material_words, typed
 from .live.models import load_model, model_path, named_model
 from .scene.hair import curves

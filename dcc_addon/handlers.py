@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The handlers that Blender calls. Each only says what is done, in which order; the work is in `live`, `reported` and `scene/`."""
+"""The handlers that Blender calls. Each only says what is done, in which order; the work is in `live`, `depsgraph_updates` and
+`scene/`.
+"""
 
 import bpy
 from bpy.app.handlers import persistent
@@ -7,14 +9,14 @@ from bpy.app.handlers import persistent
 from neuralocks_core.errors import NeuralocksError
 
 from . import background
+from .depsgraph_updates import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
 from .live import model_updates, view
 from .live.live_strands import show_all_rest, show_rest_left
-from .reported import doubt_motions, edited, forget_data, hair_placed, mark_stale, retry_failed
 from .scene.baked.attach import switch_changed
 from .scene.character.layers import working_in
-from .scene.drawing.last_called import go_last, others_called
-from .scene.drawing.locked import lock
-from .scene.drawing.together import drawn_with
+from .scene.drawing.handler_order import go_last, others_called
+from .scene.drawing.render_lock import lock
+from .scene.drawing.rendered_scenes import drawn_with
 from .scene.drawing.windows import in_view_last, layer_shown
 from .scene.files import named_from
 from .scene.files.appended import remake
@@ -22,7 +24,7 @@ from .scene.files.overrides import make_comparable
 from .scene.files.save_as import Remade
 from .scene.hair import blur
 from .scene.motion.up_to_date import ensure
-from .scene.objects.lively import lively
+from .scene.objects.live_objects import lively
 from .scene.objects.lookup import find
 from .session import session
 

@@ -6,7 +6,7 @@ import bpy
 from . import background, handlers, operators
 from .interface import menu, panels, preferences, properties
 from .live import live_rig, live_strands, preparing
-from .scene.objects.lively import lively
+from .scene.objects.live_objects import lively
 from .session import session
 
 CLASSES = (*properties.CLASSES, *preferences.CLASSES, *operators.CLASSES, *panels.CLASSES, *menu.CLASSES)

@@ -16,7 +16,7 @@ from .services.rigs.motion import Motion
 from .services.rigs.rig import BodyArrays, RigArrays
 
 if TYPE_CHECKING:
-    from .kept import Key
+    from .live_state import Key
     from .scene.character.armature import PoseReader
 
 
@@ -45,15 +45,15 @@ class SampledRig:
     own: np.ndarray
     """Rotation and scale from the bones' own channels, without constraints, (T, J, 3, 3) float32."""
     rigging: int
-    """The setup that moves the rig; see `scene.motion.sampled_from.rigging_of`."""
+    """The setup that moves the rig; see `scene.motion.dependencies.rigging_of`."""
     posture: int
-    """The unkeyed pose; see `scene.motion.sampled_from.posture_of`."""
+    """The unkeyed pose; see `scene.motion.dependencies.posture_of`."""
     unreported: dict[str, int]
     """Numbers of what Blender may not report of the bodies, by name; see `scene.motion.rigging.unreported`."""
     actions: dict[str, int]
-    """Numbers of the actions that moved it, by name; see `scene.motion.undone`."""
+    """Numbers of the actions that moved it, by name; see `scene.motion.after_undo`."""
     moved_by: frozenset[str]
-    """Names of the objects that moved it; see `scene.motion.sampled_from.moved_by`."""
+    """Names of the objects that moved it; see `scene.motion.dependencies.moved_by`."""
     carriers: dict[str, int]
     """Joints below the head that carry hair objects, by name: the jaw of a beard. All others ride on the head."""
     carried: dict[int, Character]

@@ -21,7 +21,7 @@ from .services.rigs.rig import RigArrays
 if TYPE_CHECKING:
     from neuralocks_core.models.runtime import StrandModel
 
-    from .kept import Bound, Followed, Prepared, Stood, Written
+    from .live_state import Bound, Followed, Prepared, Stood, Written
     from .sampled_rig import SampledRig
     from .scene.files.save_as import Remade
     from .services.work.threaded import Threaded
@@ -51,7 +51,7 @@ class Session:
     renewed: bool = False
     """Whether a file was opened, or an undo done, since Blender last reported edits: it then reports everything as edited."""
     watched: set[str] = field(default_factory=set)
-    """Objects that Blender evaluates although they are hidden; see `scene.drawing.watched`."""
+    """Objects that Blender evaluates although they are hidden; see `scene.drawing.hidden_objects`."""
     opened: dict[str, tuple[int, int]] = field(default_factory=dict)
     """First and last frame of each scene when its file was opened."""
     model_updated: set[str] = field(default_factory=set)
@@ -64,7 +64,7 @@ class Session:
     files: int = 0
     """How many files were opened before the one that is open."""
     baked: dict[str, dict] = field(default_factory=dict)
-    """What the caches on disk were last baked of, by path, whichever file is open; see `scene.baked.as_baked`."""
+    """What the caches on disk were last baked of, by path, whichever file is open; see `scene.baked.motion_record`."""
 
     def doubt(self) -> None:
         """Anything in the file may have changed: look before use."""
@@ -130,7 +130,7 @@ class Read:
     grooms: dict[str, int] = field(default_factory=dict)
     """A number of the rest points of each groom that plays a cache, by the name of its Curves; dropped when these are edited."""
     bodies: dict[tuple, tuple] = field(default_factory=dict)
-    """Numbers of the bodies of an armature in a scene; dropped when an edit may change them. See `scene.baked.body_known`."""
+    """Numbers of the bodies of an armature in a scene; dropped when an edit may change them. See `scene.baked.body_record`."""
     surfaces: dict[str, tuple[set[str], int]] = field(default_factory=dict)
     """What animates the shape keys of each of these body meshes, and a number of it, by mesh name; dropped when it, or an action that it
     plays, is edited."""
@@ -150,11 +150,11 @@ class Shown:
     """What the live view did to hair objects, to tell what others do to them."""
 
     written: dict[str, Written] = field(default_factory=dict)
-    """What was written to each hair object last; see `live.edited`."""
+    """What was written to each hair object last; see `live.point_edits`."""
     followed: deque[Followed] = field(default_factory=lambda: deque(maxlen=8))
-    """What was done to the points of live hair last; see `live.edited`."""
+    """What was done to the points of live hair last; see `live.point_edits`."""
     stood: dict[object, Stood] = field(default_factory=dict)
-    """How live hair objects stood when last written, by identity, also those that are gone; see `live.joined`."""
+    """How live hair objects stood when last written, by identity, also those that are gone; see `live.joined_hair`."""
 
 
 @dataclass(eq=False)

@@ -4,12 +4,12 @@
 from neuralocks_core.models.model_file import kind_known
 
 from ..live.model_updates import NOTE
-from ..scene.baked import as_groomed
+from ..scene.baked import groom_record
 from ..scene.baked.attach import has_cache
 from ..scene.character.riding import on_hair_bone
 from ..scene.hair import cached_strands, imported
 from ..scene.hair.muting import off_meanwhile
-from ..scene.objects import recorded
+from ..scene.objects import records
 from ..session import session
 
 
@@ -28,8 +28,8 @@ def hair_notes(hair, scene) -> list[str]:
         found.append(NOTE)
     if has_cache(hair) and cached_strands.changed(hair.data):
         found.append("Its strands were changed since the bake, so its cache is off; press Bake and Attach again")
-    elif has_cache(hair) and not own.live and (parts := as_groomed.changed(hair, scene)):
-        found.append(recorded.note(parts, "Bake and Attach"))
+    elif has_cache(hair) and not own.live and (parts := groom_record.changed(hair, scene)):
+        found.append(records.note(parts, "Bake and Attach"))
     if off := off_meanwhile(hair):
         found.append(f"Off while Live, or the hair would move twice: {', '.join(off)}")
     if not own.live and (problem := on_hair_bone(hair)):  # while it is live, that is an error

@@ -7,13 +7,13 @@ from neuralocks_core.character import HEAD_WIDTHS
 from neuralocks_core.motion import LOOP_GAP
 
 from ..operators.training import job, known_problem, notes
-from ..scene.baked import as_keyed, attach
+from ..scene.baked import attach, bone_record
 from ..scene.character.body import left_behind
 from ..scene.character.examined import examined
 from ..scene.files.paths import usual_output
 from ..scene.hair import imported
 from ..scene.keys import hair_keys
-from ..scene.motion.sampled_from import begins_later, frames_of
+from ..scene.motion.dependencies import begins_later, frames_of
 from ..scene.particles import waiting
 from ..services.panel.panel_errors import for_the_panel
 from ..services.panel.remaining import in_words
@@ -233,9 +233,9 @@ class NEURALOCKS_PT_rig(_Panel, bpy.types.Panel):
         taking = row.row(align=True)
         taking.enabled = hair_keys.has_keys(armature)
         taking.operator("neuralocks.remove_keys", text="", icon="X")
-        if text := as_keyed.changed_since(armature, context.scene):
+        if text := bone_record.changed_since(armature, context.scene):
             words(layout, f"{armature.name_full}: {text}", "ERROR")
-        if text := as_keyed.note(armature, context.scene):
+        if text := bone_record.note(armature, context.scene):
             words(layout, text, "INFO")
         column = layout.column(align=True)  # side by side, a sidebar of default width would cut them
         column.operator("neuralocks.export_skel", text="USD Animation", icon="EXPORT")

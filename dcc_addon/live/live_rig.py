@@ -4,12 +4,12 @@
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
-from ..kept import Bound
+from ..live_state import Bound
 from ..scene.drawing.clock import shown_frame
 from ..scene.keys import rotations
 from ..services.hair.bones import LiveBones
 from ..session import session
-from .blowing import blowing
+from .character_wind import blowing
 from .models import model_path, stamp
 from .pose import pose
 from .unsampled import unsampled

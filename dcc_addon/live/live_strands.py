@@ -7,22 +7,22 @@ from functools import lru_cache
 import bpy
 import numpy as np
 
-from neuralocks_core.deformation.suited import suited
+from neuralocks_core.deformation.model_choice import suited
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.materials import Material
 from neuralocks_core.rotation import inverse
 
-from ..kept import Prepared
+from ..live_state import Prepared
 from ..scene.character.layers import graph_of, layer_of
 from ..scene.character.placing import world
 from ..scene.character.riding import on_hair_bone
 from ..scene.drawing.clock import shown_frame
-from ..scene.drawing.watched import evaluated_for_itself
+from ..scene.drawing.hidden_objects import evaluated_for_itself
 from ..scene.drawing.windows import drawing, in_view_last, layer_shown
 from ..scene.files.paths import check_found
 from ..scene.hair import curves
 from ..scene.hair.muting import mute_deformers, unmute_deformers
-from ..scene.objects.lively import lively
+from ..scene.objects.live_objects import lively
 from ..scene.objects.lookup import find, identity, in_scene
 from ..services.hair.live import LiveHair
 from ..services.panel.sliders import MATERIAL, MOTION
@@ -30,8 +30,8 @@ from ..services.rigs import rig as rig_service
 from ..services.rigs.axes import to_core
 from ..services.rigs.motion import TOLERANCE
 from ..session import session
-from . import edited, joined, preparing
-from .blowing import blowing
+from . import joined_hair, point_edits, preparing
+from .character_wind import blowing
 from .models import load_model, model_path, named_model, stamp
 from .pose import pose
 from .unsampled import unsampled
@@ -60,8 +60,8 @@ def at_once(graph) -> bool:
 def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
     armature, sampled = _sampled_with(hair, home)
     place = world(hair, graph)
-    joined.settle(hair)
-    edited.follow(hair, sampled, place)
+    joined_hair.settle(hair)
+    point_edits.follow(hair, sampled, place)
     settings, core = hair.neuralocks_hair, to_core(sampled.motion.metres_per_unit)
     joints = pose(armature, sampled, scene, graph, moved, settings.resolve)
     frame = shown_frame(scene)
@@ -77,10 +77,10 @@ def _update(hair, scene, graph, moved: bool, wait: bool, home) -> None:
         show_rest(hair)
         return
     points = prepared.hair.points(*wanted)
-    curves.keep_rest(hair.data, edited.intact(hair))
+    curves.keep_rest(hair.data, point_edits.intact(hair))
     mute_deformers(hair)
-    edited.write(hair, points, place, prepared.rest)
-    joined.remember(hair, prepared.made_of[0])
+    point_edits.write(hair, points, place, prepared.rest)
+    joined_hair.remember(hair, prepared.made_of[0])
     hair.data.update_tag()
     if graph.mode == "RENDER" and bpy.app.version < (4, 0):
         # The render of an older Blender shows the points of the previous frame unless the object is updated, too; with its
@@ -250,7 +250,7 @@ def rest(hair) -> None:
     """Live is over for this hair: rest shape and modifiers as before, nothing kept."""
     session.forget(hair.name_full)
     show_rest(hair)
-    joined.forget(hair)
+    joined_hair.forget(hair)
 
 
 def show_rest_left(things) -> None:
@@ -266,7 +266,7 @@ def show_all_rest() -> None:
     """Restore the rest shapes of all curves of the file, also those that live hair left behind, in no scene or with no object."""
     for thing in bpy.data.objects:
         if thing.type == "CURVES":
-            joined.settle(thing)
+            joined_hair.settle(thing)
     for data in bpy.data.hair_curves:
         if data.library is None:
             curves.restore_rest(data)
@@ -282,9 +282,9 @@ def show_rest(hair) -> None:
 
 def _restore(hair) -> None:
     """Restore the rest shape of an object's curves, also that of hair joined to them."""
-    joined.settle(hair)
+    joined_hair.settle(hair)
     curves.restore_rest(hair.data)
-    edited.forget(hair)
+    point_edits.forget(hair)
 
 
 def _give_up(hair, message: str) -> None:

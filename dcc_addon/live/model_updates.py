@@ -10,7 +10,7 @@ import bpy
 
 from neuralocks_core.models import model_file
 
-from ..scene.objects.lively import lively
+from ..scene.objects.live_objects import lively
 from ..session import session
 
 NOTE = (

@@ -7,9 +7,9 @@ from neuralocks_core.errors import NeuralocksError
 
 from ..scene.character.binding import hidden
 from ..scene.drawing.clock import shown_frame
-from ..scene.drawing.last_called import others_called
+from ..scene.drawing.handler_order import others_called
 from ..scene.keys.hair_keys import as_before
-from ..scene.motion.sampled_from import timing_of
+from ..scene.motion.dependencies import timing_of
 from ..services.rigs.axes import to_core
 from ..services.rigs.motion import as_carried, same_pose
 from ..session import session

@@ -6,10 +6,10 @@ from dataclasses import replace
 import bpy
 
 from ..scene.character.layers import elsewhere, graph_of, layer_of
-from ..scene.drawing.guests import guests
-from ..scene.drawing.locked import lock
+from ..scene.drawing.other_scenes import guests
+from ..scene.drawing.render_lock import lock
 from ..scene.motion.up_to_date import current
-from ..scene.objects.lively import lively
+from ..scene.objects.live_objects import lively
 from ..scene.objects.lookup import find, in_scene
 from ..session import session
 from . import live_rig, live_strands

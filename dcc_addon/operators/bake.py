@@ -17,7 +17,7 @@ from ..live.view import refresh
 from ..scene.baked import attach
 from ..scene.character.carried import hairs_of
 from ..scene.character.riding import on_hair_bone
-from ..scene.drawing.shown import in_renders
+from ..scene.drawing.visibility import in_renders
 from ..scene.export import write_shot
 from ..scene.files.paths import check_own
 from ..scene.hair import imported

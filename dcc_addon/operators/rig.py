@@ -10,11 +10,11 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig import RigModel
 
 from ..bake_files import output_path, owner_of, shot_beside
-from ..live.blowing import blowing
+from ..live.character_wind import blowing
 from ..live.live_rig import bind, rest, show_rest
 from ..live.models import model_path
 from ..live.view import refresh
-from ..scene.baked import as_keyed
+from ..scene.baked import bone_record
 from ..scene.drawing.clock import stretch_of
 from ..scene.export import write_shot
 from ..scene.files.paths import absolute, check_own
@@ -83,7 +83,7 @@ class NEURALOCKS_OT_bake_keys(Stepwise, bpy.types.Operator):
         settings.rig_live = False
         rest(armature)
         action = hair_keys.bake_keys(armature, bones.bones, (stretch * frames, turns), (stretch * every, own))
-        as_keyed.remember(action, armature, scene, (first, last))
+        bone_record.remember(action, armature, scene, (first, last))
         return f"{name}: {len(bones.bones)} hair bones keyed in '{action.name}'"
 
 

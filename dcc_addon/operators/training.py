@@ -11,7 +11,7 @@ from bpy.props import EnumProperty
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models.model_file import SUFFIX
-from neuralocks_core.training.work import abandon, reserve
+from neuralocks_core.training.work_folder import abandon, reserve
 
 from ..live.view import refresh
 from ..scene.drawing.redraw import redraw

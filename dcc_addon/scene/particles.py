@@ -13,7 +13,7 @@ from neuralocks_core.rotation import flat
 from ..services.hair.widths import radii
 from .character.armature import matrix
 from .character.binding import at_rest
-from .drawing.shown import homes_of
+from .drawing.visibility import homes_of
 from .files.paths import check_own
 from .hair import curves
 from .objects.animated import moved

@@ -72,7 +72,7 @@ def shipped(kind: str = "strands") -> Path:
 
 @cache
 def specialists() -> tuple[Path, ...]:
-    """Paths of the shipped strand models that know some styles better than `shipped()`; see `deformation.suited`."""
+    """Paths of the shipped strand models that know some styles better than `shipped()`; see `deformation.model_choice`."""
     return tuple(sorted((Path(__file__).parents[1] / "shipped").glob(f"strands_*{SUFFIX}")))
 
 

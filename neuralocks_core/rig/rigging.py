@@ -7,10 +7,10 @@ import numpy as np
 
 from neuralocks_core.body.holes import closed_holes
 from neuralocks_core.character import Character, Skeleton
+from neuralocks_core.rig.chain_finding import find_chains
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import find_chains
 from neuralocks_core.rig.kinematics import skin_weights
-from neuralocks_core.rig.parting import parted
+from neuralocks_core.rig.mesh_parts import parted
 from neuralocks_core.skinned_body import Body
 
 ROOM = 0.2

@@ -15,14 +15,14 @@ import torch
 
 from neuralocks_core.models.shortcomings import HELD, HELD_BEGUN
 from neuralocks_core.training import checkpoint
-from neuralocks_core.training.beginning import Beginning
+from neuralocks_core.training.data.farm import RolloutFarm
+from neuralocks_core.training.data.rollouts import TrainingScene
 from neuralocks_core.training.gauge import Gauge, measure
 from neuralocks_core.training.learning.methods import wait
 from neuralocks_core.training.learning.regression import RolloutBank
-from neuralocks_core.training.material.farm import RolloutFarm
-from neuralocks_core.training.material.rollouts import TrainingScene
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.option_checks import changed
+from neuralocks_core.training.warm_start import Beginning
 
 SAVE_EVERY = 45.0
 """Time between checkpoints [s]: a kill loses at most this much."""

@@ -18,18 +18,18 @@ from neuralocks_core.strands.resemblance import learned_hair
 from neuralocks_core.strands.strand_set import scalp_local
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder, train_autoencoder
-from neuralocks_core.training.beginning import Beginning, kept_coder
+from neuralocks_core.training.data.farm import RolloutFarm, check_guarded
+from neuralocks_core.training.data.rollouts import TrainingScene, kept_from_training, learned_measures
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.learning.methods import method_of
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.learning.regression import RolloutBank
 from neuralocks_core.training.learning.regression_options import RegressionOptions
-from neuralocks_core.training.material.farm import RolloutFarm, check_guarded
-from neuralocks_core.training.material.rollouts import TrainingScene, kept_from_training, learned_measures
 from neuralocks_core.training.option_checks import check_options
 from neuralocks_core.training.run import Run, plain
 from neuralocks_core.training.threads import threads
-from neuralocks_core.training.work import (
+from neuralocks_core.training.warm_start import Beginning, kept_coder
+from neuralocks_core.training.work_folder import (
     CODES,
     beginning_of,
     claimed,

@@ -11,7 +11,7 @@ import pytest
 
 from dcc_addon.services.training import training_child
 from neuralocks_core.errors import NeuralocksError
-from neuralocks_core.training.work import folder_beside
+from neuralocks_core.training.work_folder import folder_beside
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from ..border.stage_files import write_stage
 from ..shot.strands.curve_ends import Beyond
 from ..shot.strands.curves import find_curves
 from ..skel.stage_rig import StageRig
-from .beside import Beside
+from .curve_primvars import Beside
 from .prims import POLYLINES, Spline, author_curves
 
 BELOW = 0.02

@@ -19,7 +19,7 @@ from neuralocks_core.progress import Progress, silent, within
 from ..baking.points.undrawn_points import UndrawnPoints
 from ..border.stage_files import OTHERS, USD, check_layer_name
 from ..skel.stage_rig import StageRig
-from .beside import Beside, Primvar
+from .curve_primvars import Beside, Primvar
 from .groom import Authored, write_grooms
 from .grow import Barber, whose_head
 from .usd_hair import read_usd

@@ -4,7 +4,7 @@
 from pxr import Sdf, Tf
 
 from ..rig.stage import BAKED
-from ..shot.bakes.recorded import KEY
+from ..shot.bakes.bake_record import KEY
 from .scene_writer import PLAYER, ROOT
 
 

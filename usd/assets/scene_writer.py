@@ -11,7 +11,7 @@ from neuralocks_core.files import as_path
 
 from ..border.arrays import floats, integers, quaternions, row_matrix, vectors
 from ..border.stage_files import write_stage
-from ..shot.bakes.recorded import KEY
+from ..shot.bakes.bake_record import KEY
 from .prims import Spline, author_curves, author_influences, author_skeleton, bind_rigidly, bind_to
 
 ROOT = "/Character"

@@ -16,22 +16,22 @@ from ..border.placement import Placement
 from ..border.stage_files import check_not_input, open_stage
 from ..border.stopping import check
 from ..border.units import Border
-from ..shot.carriers.alike import one_person
 from ..shot.carriers.attach import Attachment
+from ..shot.carriers.twin_bodies import one_person
 from ..shot.characters.skeletons import read_each_rig
+from ..shot.notes.groom_notes import groom_notes, no_points
+from ..shot.notes.missing import no_groom
+from ..shot.notes.shot_notes import composition_notes, few, unit_notes
 from ..shot.search.hair_search import HairSearch
 from ..shot.search.other_curves import of_other_kinds
 from ..shot.search.rig_controls import open_curves
 from ..shot.strands.curve_ends import beyond_ends
 from ..shot.strands.curves import find_curves, read_groom, widths_attribute, without_points
-from ..shot.telling.groom_notes import groom_notes, no_points
-from ..shot.telling.lacking import no_groom
-from ..shot.telling.notes import composition_notes, few, unit_notes
 from ..skel.bind_world import bind_shown
 from ..skel.binding import bound_skeleton, geom_bind
 from ..skel.joints import JointSource
 from ..skel.source import find_skeletons
-from .beside import read_beside
+from .curve_primvars import read_beside
 from .groom import Authored
 from .prims import Spline
 

@@ -17,7 +17,7 @@ from neuralocks_core.wind import check_felt
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
-from ..shot.bakes.recorded import given_facts
+from ..shot.bakes.bake_record import given_facts
 from ..shot.stage import StageGroom
 from ..shot.wind import as_wind, in_core, wind_facts
 from .groom_models import GroomModels

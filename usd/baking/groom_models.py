@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-from neuralocks_core.deformation.suited import suited
+from neuralocks_core.deformation.model_choice import suited
 from neuralocks_core.models.runtime import StrandModel
 
 from ..shot.stage import StageGroom

@@ -9,8 +9,8 @@ from neuralocks_core.models.model_file import shipped, specialists
 from neuralocks_core.models.runtime import StrandModel
 
 from ..shot.carriers.attach import Attachment
-from ..shot.telling.character_notes import untrained
-from ..shot.telling.notes import without_strength
+from ..shot.notes.character_notes import untrained
+from ..shot.notes.shot_notes import without_strength
 
 
 def model_notes(

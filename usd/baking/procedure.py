@@ -13,9 +13,9 @@ from neuralocks_core.wind import Wind
 from ..border.time_codes import given_cuts, time_codes
 from ..shot.bakes.also_changed import also_changed
 from ..shot.bakes.gaps import hidden
+from ..shot.notes.shot_notes import asked_notes, few, out_of_place
 from ..shot.stage import Shot, check_frames_named, read_shot
 from ..shot.strands.curves import find_curves
-from ..shot.telling.notes import asked_notes, few, out_of_place
 
 
 @dataclass(frozen=True)

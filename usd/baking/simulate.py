@@ -22,7 +22,7 @@ from neuralocks_core.warp_device import start_warp
 
 from ..border.amounts import check_number
 from ..border.stage_files import check_layer_name
-from ..shot.bakes.recorded import given_facts
+from ..shot.bakes.bake_record import given_facts
 from ..shot.stage import StageGroom
 from ..shot.wind import as_wind, in_core, wind_facts
 from .bake import as_material

@@ -124,7 +124,7 @@ def _reached(report: dict, strands_too: bool) -> str:
 
 def _how_to_go_on(out: Path) -> list[str]:
     """How to resume: a training that starts anew deletes what an earlier one kept."""
-    from neuralocks_core.training.work import work_folder
+    from neuralocks_core.training.work_folder import work_folder
 
     try:
         work_folder(out, resume=True)

@@ -21,9 +21,9 @@ from ..border.stage_files import open_stage
 from ..border.units import Border
 from ..border.values import as_names
 from ..shot.characters.skeletons import read_each_rig
-from ..shot.telling.lacking import nothing_found
-from ..shot.telling.motion_notes import motion_notes
-from ..shot.telling.notes import without_turn
+from ..shot.notes.missing import nothing_found
+from ..shot.notes.motion_notes import motion_notes
+from ..shot.notes.shot_notes import without_turn
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from neuralocks_core.arguments import flag
 from neuralocks_core.boundary.spec import BoundarySpec
-from neuralocks_core.deformation.suited import nearest_to_all
+from neuralocks_core.deformation.model_choice import nearest_to_all
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path, check_writable
 from neuralocks_core.models import model_file
@@ -87,7 +87,7 @@ def train(
     from neuralocks_core.training.learning.selfsupervised import paper_boundary
     from neuralocks_core.training.option_checks import check_options
     from neuralocks_core.training.train import train_strands
-    from neuralocks_core.training.work import BEGINNING, work_folder
+    from neuralocks_core.training.work_folder import BEGINNING, work_folder
 
     from .training_scene import training_scene
 
@@ -128,8 +128,8 @@ def begins_with(begin: str | Path | None, resume: bool, spec: BoundarySpec, opti
     Raises:
         NeuralocksError: the file named is not a model, or differs from what is trained.
     """
-    from neuralocks_core.training.beginning import Beginning
     from neuralocks_core.training.learning.regression_options import RegressionOptions
+    from neuralocks_core.training.warm_start import Beginning
 
     if begin == NOTHING or (begin is None and (resume or not isinstance(options, RegressionOptions))):
         return None

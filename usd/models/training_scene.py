@@ -15,20 +15,20 @@ from neuralocks_core.groom import Groom
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.progress import Progress, silent
 from neuralocks_core.strands.strand_set import StrandSet, strands_on
-from neuralocks_core.training.material.rollouts import LEAST, TrainingScene
+from neuralocks_core.training.data.rollouts import LEAST, TrainingScene
 
 from ..assets.grow import Barber
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import check_file, open_stage
-from ..shot.carriers.alike import one_person
 from ..shot.carriers.attach import attach, of_another
+from ..shot.carriers.twin_bodies import one_person
 from ..shot.characters.skeletons import read_each_rig
+from ..shot.notes.shot_notes import few, first_of, unfound, unlikely_head
 from ..shot.search.rig_controls import open_curves
 from ..shot.stage import read_rigs
 from ..shot.strands.curve_ends import groom_between
 from ..shot.strands.curves import find_curves, without_points
-from ..shot.telling.notes import few, first_of, unfound, unlikely_head
 from ..skel.binding import bound_skeleton
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig

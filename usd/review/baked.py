@@ -13,9 +13,9 @@ from neuralocks_core.preview.film import Scene
 from neuralocks_core.rotation import transformed
 
 from ..border.values import as_numbers
+from ..shot.bakes.bake_record import recorded_cuts, recorded_joint, retimed
 from ..shot.bakes.gaps import gaps, some
-from ..shot.bakes.recorded import recorded_cuts, recorded_joint, retimed
-from ..shot.carriers.alike import one_person
+from ..shot.carriers.twin_bodies import one_person
 from ..shot.made_from import baked_from_others
 from ..shot.stage import Shot, StageGroom, read_shot
 from ..skel.stage_rig import StageRig

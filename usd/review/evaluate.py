@@ -14,7 +14,7 @@ from ..baking.bake import as_material
 from ..baking.batches import grouped
 from ..baking.groom_models import GroomModels
 from ..border.damage import names_damage
-from ..shot.bakes.recorded import recorded_material
+from ..shot.bakes.bake_record import recorded_material
 from ..shot.stage import StageGroom
 from .baked import Baked, read_baked
 from .depths import depths

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pxr import UsdGeom
 
-from neuralocks_core.deformation.suited import suited
+from neuralocks_core.deformation.model_choice import suited
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.materials import Material
@@ -19,14 +19,14 @@ from ..baking.model_notes import model_notes
 from ..border.placement import Placement
 from ..border.units import Border
 from ..border.values import as_numbers
+from ..shot.bakes.bake_record import recorded, retimed
 from ..shot.bakes.gaps import gaps
-from ..shot.bakes.recorded import recorded, retimed
 from ..shot.characters.whole_body import WholeBodies
 from ..shot.made_from import baked_from_others
+from ..shot.notes.groom_notes import groom_notes
 from ..shot.search.hair_search import HairSearch
 from ..shot.strands.curve_ends import groom_between, undrawn
 from ..shot.strands.curves import rest_counts
-from ..shot.telling.groom_notes import groom_notes
 
 
 def facts_of_grooms(

@@ -9,7 +9,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import as_path
 from neuralocks_core.models.model_file import SUFFIX
-from neuralocks_core.rig.finding import NoHairChains
+from neuralocks_core.rig.chain_finding import NoHairChains
 from neuralocks_core.rig.rigging import assemble_rig
 
 from ..border.damage import names_damage
@@ -17,19 +17,16 @@ from ..border.stage_files import OTHERS, USD, open_stage
 from ..border.units import Border
 from ..rig.facing import askew_notes
 from ..rig.notes import RIG_JOINTS, mirrored_notes, offset_notes
-from ..rig.outside import left_out_notes, outside_notes, unnamed_notes
 from ..rig.stage import check_authored, check_orients, core_meshes, describe_chains, is_baked, of_bake
 from ..rig.uneven import names_uneven_prims
-from ..shot.bakes.recorded import recorded, recorded_cuts
+from ..rig.unmoved_joints import left_out_notes, outside_notes, unnamed_notes
+from ..shot.bakes.bake_record import recorded, recorded_cuts
 from ..shot.characters.skeletons import read_each_rig
 from ..shot.characters.whole_body import WholeBodies
-from ..shot.search.hair_search import HairSearch
-from ..shot.stage import frame_range
-from ..shot.strands.curves import find_curves
-from ..shot.telling.character_notes import lies_down, untrained, weight_notes, without_body
-from ..shot.telling.lacking import no_groom, no_skeleton
-from ..shot.telling.motion_notes import motion_notes
-from ..shot.telling.notes import (
+from ..shot.notes.character_notes import lies_down, untrained, weight_notes, without_body
+from ..shot.notes.missing import no_groom, no_skeleton
+from ..shot.notes.motion_notes import motion_notes
+from ..shot.notes.shot_notes import (
     another_head,
     composition_notes,
     few,
@@ -41,6 +38,9 @@ from ..shot.telling.notes import (
     rig_notes,
     without_turn,
 )
+from ..shot.search.hair_search import HairSearch
+from ..shot.stage import frame_range
+from ..shot.strands.curves import find_curves
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 from .groom_facts import facts_of_grooms, groom_facts

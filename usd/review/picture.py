@@ -12,7 +12,7 @@ from neuralocks_core.files import as_path
 from neuralocks_core.preview import pictures as drawing
 from neuralocks_core.preview.film import AZIMUTH
 from neuralocks_core.progress import Progress
-from neuralocks_core.rig.finding import NoHairChains
+from neuralocks_core.rig.chain_finding import NoHairChains
 
 from ..border.amounts import check_number
 from ..border.damage import names_damage
@@ -22,10 +22,10 @@ from ..border.time_codes import parse_frames, time_codes
 from ..border.units import Border
 from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
+from ..shot.notes.shot_notes import few
 from ..shot.strands.curves import find_curves
-from ..shot.telling.notes import few
 from .baked import MOST_BODY_POINTS, Baked, NotBaked, read_baked
-from .groomed import as_groomed
+from .unbaked import as_groomed
 
 SIDES = 16, 4096
 """Least and largest width and height of a picture [pixels]."""

@@ -19,7 +19,7 @@ from neuralocks_core.strands.centreline import passes, smoothed
 from neuralocks_core.strands.strand_set import CLAMPED, StrandSet, strands_on
 from neuralocks_core.wind import Wind
 
-from ..shot.bakes.recorded import recorded, recorded_volume
+from ..shot.bakes.bake_record import recorded, recorded_volume
 from ..shot.stage import StageGroom
 from ..shot.wind import recorded_wind
 from .baked import Baked

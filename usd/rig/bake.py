@@ -21,11 +21,11 @@ from ..border.stage_files import check_layer_name, check_not_over
 from ..border.stopping import check
 from ..border.time_codes import given_cuts
 from ..shot.bakes.also_changed import also_changed
+from ..shot.notes.shot_notes import asked_notes, left_out, out_of_place, without_strength
 from ..shot.stage import check_cuts
-from ..shot.telling.notes import asked_notes, left_out, out_of_place, without_strength
 from ..shot.wind import as_wind, in_core, wind_facts
 from ..skel.source import find_skeletons
-from .bound import BoundHair
+from .character_bake import BoundHair
 from .layer import MovedHair, write_rig_layer
 from .stage import of_skeleton, read_rigged_hairs
 

@@ -16,7 +16,7 @@ from neuralocks_core.rotation import quaternion_product, relative_to_parents, ro
 from ..baking.layer.header import apply_binding, over_prim, write_header
 from ..border.damage import named
 from ..border.stage_files import refresh_open
-from ..shot.bakes.recorded import record
+from ..shot.bakes.bake_record import record
 from ..skel.joints import JointSource
 from ..skel.rig_copy import hair_of, tell_source
 from .stage import BAKED, RiggedHair

@@ -8,12 +8,12 @@ from neuralocks_core.rig.carried import moved_between
 from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import rig_spec
 
-from ..shot.telling.character_notes import lies_down, weight_notes
-from ..shot.telling.notes import another_head, unfound, unlikely_head
+from ..shot.notes.character_notes import lies_down, weight_notes
+from ..shot.notes.shot_notes import another_head, unfound, unlikely_head
 from ..skel.stage_rig import StageRig
 from .facing import askew_notes
-from .outside import left_out_notes, outside_notes
 from .stage import RiggedHair, core_meshes
+from .unmoved_joints import left_out_notes, outside_notes
 
 RIG_JOINTS = rig_spec().pose_joints
 """Semantic joints that rig models read besides the head."""

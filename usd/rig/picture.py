@@ -7,7 +7,7 @@ import numpy as np
 
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.preview.film import Scene
-from neuralocks_core.rig.parting import parted
+from neuralocks_core.rig.mesh_parts import parted
 from neuralocks_core.rig.rigging import moving_joints
 from neuralocks_core.rotation import transformed
 

@@ -13,8 +13,8 @@ from pxr import Usd, UsdSkel
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError, reworded
+from neuralocks_core.rig.chain_finding import NoHairChains, fits
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import NoHairChains, fits
 from neuralocks_core.rig.measuring import UNEVEN, placed_chains
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.skinned_body import Body
@@ -28,8 +28,8 @@ from ..border.units import Border
 from ..border.values import as_names
 from ..shot.characters.others import Others
 from ..shot.characters.whole_body import parts_elsewhere, with_parts
-from ..shot.telling.lacking import has_hair_joints, nothing_found
-from ..shot.telling.notes import partial_body
+from ..shot.notes.missing import has_hair_joints, nothing_found
+from ..shot.notes.shot_notes import partial_body
 from ..skel.source import find_skeletons, read_rig
 from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins

@@ -15,9 +15,9 @@ from neuralocks_core.progress import Progress
 from ..border.amounts import check_number
 from ..border.command_line import command_line
 from ..border.extras import check_training
-from .beginning import HIGHEST, LOWEST, Beginning
 from .notes import chain_notes, rigged_notes
 from .stage import check_patterns, read_rigged_hair
+from .warm_start import HIGHEST, LOWEST, Beginning
 
 
 def train_rig(

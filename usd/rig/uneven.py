@@ -9,7 +9,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rig.measuring import UNEVEN, UnevenJoint
 
-from ..shot.telling.character_notes import uneven
+from ..shot.notes.character_notes import uneven
 from ..skel.stage_rig import StageRig
 
 

@@ -7,7 +7,7 @@ from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.groom import Groom
 from neuralocks_core.sketch import alike, sketch
 
-from .bakes.recorded import recorded, recorded_joint, seen_as_written
+from .bakes.bake_record import recorded, recorded_joint, seen_as_written
 from .carriers.attach import Attachment
 
 INPUTS = "inputs"

@@ -24,13 +24,10 @@ from .carriers.attach import Attachment
 from .characters.others import Others
 from .characters.skeletons import read_each_rig
 from .characters.whole_body import WholeBodies, whole_body
-from .search.hair_search import HairSearch
-from .strands.curve_ends import Beyond, groom_between
-from .strands.curves import find_curves
-from .telling.character_notes import lies_down, untrained, weight_notes, without_body
-from .telling.groom_notes import groom_notes, stands_still
-from .telling.lacking import no_groom, no_skeleton
-from .telling.notes import (
+from .notes.character_notes import lies_down, untrained, weight_notes, without_body
+from .notes.groom_notes import groom_notes, stands_still
+from .notes.missing import no_groom, no_skeleton
+from .notes.shot_notes import (
     composition_notes,
     few,
     layer_notes,
@@ -40,6 +37,9 @@ from .telling.notes import (
     rig_notes,
     without_turn,
 )
+from .search.hair_search import HairSearch
+from .strands.curve_ends import Beyond, groom_between
+from .strands.curves import find_curves
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from neuralocks_core.wind import Wind
 
 from ..border.amounts import check_number
 from ..border.units import Border
-from .bakes.recorded import in_stage, recorded, seen_as_written
+from .bakes.bake_record import in_stage, recorded, seen_as_written
 
 
 def as_wind(mean, gusts: float | None = None) -> Wind | None:

@@ -14,8 +14,8 @@ from ..files.save_as import named_here
 from ..hair import blur, cached_strands
 from ..hair.muting import CACHE as MODIFIER
 from ..hair.muting import caches_of_others, mute_deformers, off_meanwhile, unmute_deformers
-from . import as_baked, as_groomed
-from .rewritten import read_again
+from . import groom_record, motion_record
+from .rewritten_caches import read_again
 
 REPLACED = "replaced"
 """The setting that stores which modifiers are off because the cache contains the surface's motion."""
@@ -47,8 +47,8 @@ def changed_since(thing, scene) -> str:
     if cache is None:
         return ""
     path = _place(cache)
-    told = session.baked.get(path, cache.get(as_baked.KEY))
-    return as_baked.changed(told, thing.neuralocks_hair.armature, scene, "Bake and Attach", path)
+    told = session.baked.get(path, cache.get(motion_record.KEY))
+    return motion_record.changed(told, thing.neuralocks_hair.armature, scene, "Bake and Attach", path)
 
 
 def players(path: str) -> list:
@@ -126,7 +126,7 @@ def switch_changed() -> None:
 def detach(hair) -> bool:
     """Remove the cache, and let the hair follow its surface as before; returns whether there was one."""
     blur.detach(hair)
-    as_groomed.forget(hair)
+    groom_record.forget(hair)
     if not has_cache(hair):  # it may have been removed by hand
         unmute_deformers(hair, REPLACED)
         return False
@@ -178,10 +178,10 @@ def _cache_file(path: str):
 
 
 def _remember(hair, cache, scene, frames: tuple[int, int]) -> None:
-    as_groomed.remember(hair, scene)
+    groom_record.remember(hair, scene)
     if hair.neuralocks_hair.armature is not None:
         path = _place(cache)
-        session.baked[path] = as_baked.remember(cache, hair.neuralocks_hair.armature, scene, frames, path)
+        session.baked[path] = motion_record.remember(cache, hair.neuralocks_hair.armature, scene, frames, path)
 
 
 def _is(cache, path: str) -> bool:

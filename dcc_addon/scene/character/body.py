@@ -14,7 +14,7 @@ from neuralocks_core.rotation import inverse
 from ...services.rigs.mirror import mirrored
 from ...services.rigs.rig import BodyArrays
 from ...session import session
-from ..drawing.shown import in_renders
+from ..drawing.visibility import in_renders
 from .armature import matrix
 from .binding import carrier, carrying_bone, deforming, followers
 from .skinned import deformed, moving_groups

@@ -8,7 +8,7 @@ import numpy as np
 from neuralocks_core.rotation import transformed
 
 from ...services.rigs.axes import to_core
-from ..drawing.watched import evaluated_for_itself
+from ..drawing.hidden_objects import evaluated_for_itself
 from ..objects.lookup import find
 from .armature import matrix
 from .body import left_behind, vertices

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import bpy
 
-from ..drawing.shown import enabled
+from ..drawing.visibility import enabled
 from .binding import armatures_of
 from .carried import bodies_of, hairs_of
 

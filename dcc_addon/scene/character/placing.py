@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..drawing.watched import evaluated_for_itself
+from ..drawing.hidden_objects import evaluated_for_itself
 from .armature import matrix
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from neuralocks_core.rotation import flat, inverse, transformed
 
-from ..drawing.shown import in_renders
+from ..drawing.visibility import in_renders
 from ..hair import curves
 from .binding import carrying_bone, deforming, followers
 from .body import followed_bone, vertices

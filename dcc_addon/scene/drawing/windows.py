@@ -3,7 +3,7 @@
 
 import bpy
 
-from .guests import homes
+from .other_scenes import homes
 
 
 def scenes_shown() -> list:

@@ -5,7 +5,7 @@ all frames, and those that grow more hair beside it use the posed surface. Their
 
 import json
 
-from ..objects.remembered import remembered
+from ..objects.stored_values import remembered
 from . import blur, switches, unbound
 from .nodes import inputs_of, read_input, write_input
 

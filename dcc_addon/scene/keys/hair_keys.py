@@ -11,7 +11,7 @@ from neuralocks_core.errors import NeuralocksError
 from ..objects.animated import animated
 from ..objects.lookup import identified, identity
 from ..objects.relations import found_anew
-from . import alone, rotations
+from . import rotations, sole_action
 from .keyframes import keyed_action, put_on_top
 
 TRACK, BEFORE = "Neuralocks Hair", "Neuralocks Before Hair"
@@ -24,7 +24,7 @@ HAIR = TRACK, BEFORE, TRACK + OVERRIDE, BEFORE + OVERRIDE
 KEPT = "neuralocks_rotations"
 """Property of the action that holds the hair bones' earlier rotations."""
 ALONE = "neuralocks_alone"
-"""Property of the same action that holds how the artist's action was set; see `alone`."""
+"""Property of the same action that holds how the artist's action was set; see `sole_action`."""
 STILL = 1e-6
 """Rotations that change by less than this over time do not move."""
 
@@ -58,7 +58,7 @@ def bake_keys(armature, bones, hair: tuple[np.ndarray, np.ndarray], own: tuple[n
     below = keyed_action(armature, f"{armature.name} Before Hair", modes, frames[:needed], before_hair[:needed])
     put_on_top(data, BEFORE + ending, below)
     action = keyed_action(armature, f"{armature.name} Hair", modes, *hair)
-    action[KEPT], action[ALONE] = before, alone.keep_alone(data, HAIR)
+    action[KEPT], action[ALONE] = before, sole_action.keep_alone(data, HAIR)
     # If tracks are deleted by hand, the first bake knows the artist's own rotations.
     settings.keys_kept = rotations.joined(before, older[0])
     settings.keys_alone = older[1] or action[ALONE]
@@ -166,7 +166,7 @@ def remove(armature) -> str:
     """
     muted, settings = _take_off(armature), armature.neuralocks_character
     rotations.give_back(armature, settings.keys_kept, keyed=True, without=HAIR)
-    alone.give_back(armature.animation_data, settings.keys_alone, HAIR)
+    sole_action.give_back(armature.animation_data, settings.keys_alone, HAIR)
     settings.keys_kept = settings.keys_alone = ""
     return muted
 
@@ -183,7 +183,7 @@ def _take_off(armature) -> str:
             armature.animation_data.nla_tracks.remove(track)
     for action in actions:
         rotations.give_back(armature, action.get(KEPT, ""), keyed=True, without=HAIR)
-        alone.give_back(armature.animation_data, action.get(ALONE, ""), HAIR)
+        sole_action.give_back(armature.animation_data, action.get(ALONE, ""), HAIR)
         if not action.users:  # otherwise somebody keeps it
             bpy.data.actions.remove(action)
     return muted

@@ -11,7 +11,7 @@ from mathutils import Euler, Quaternion
 from neuralocks_core.errors import NeuralocksError
 
 from ..objects.animated import animated
-from ..objects.remembered import are_numbers, remembered
+from ..objects.stored_values import are_numbers, remembered
 
 SAME = 1e-7
 """Values that differ by less than this are the same turn."""

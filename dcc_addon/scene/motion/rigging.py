@@ -11,11 +11,11 @@ import numpy as np
 
 from ..character.body import up_to_armature, weighed_so
 from ..keys.hair_keys import HAIR, as_before
-from ..objects import recorded
+from ..objects import records
 from ..objects.animated import animated, curves_of, strips_of, targets_of, written
 from ..objects.settings import as_set, objects_named, settings_of
-from .shapes import shape
-from .unkeyed import PLACE, value_of
+from .ground_shapes import shape
+from .unkeyed_poses import PLACE, value_of
 
 REST = {"matrix_local": 16, "use_inherit_rotation": 1, "use_local_location": 1, "use_deform": 1}
 IK = ("ik_stretch", *(f"ik_{end}_{axis}" for end in ("min", "max", "stiffness") for axis in "xyz"))
@@ -32,7 +32,7 @@ def rigging(things) -> int:
     others = reached(things)[len(things) :]
     shaping = [_shaped_by(thing) for thing in things if thing.type == "MESH"]
     found = [*map(_object, things), *shaping, *([*_object(thing), *_modifiers(thing)] for thing in others)]
-    return recorded.number_of(found)
+    return records.number_of(found)
 
 
 def posture(things) -> int:
@@ -42,7 +42,7 @@ def posture(things) -> int:
     """
     others = reached(things)[len(things) :]
     found = [*map(_held, things), *([*_held(thing), *shape(thing)] for thing in others)]
-    return recorded.number_of(found)
+    return records.number_of(found)
 
 
 def unreported(body) -> int:
@@ -55,7 +55,7 @@ def unreported(body) -> int:
     if keys:
         still = [name for name in ("use_relative", "eval_time") if name not in animated(keys.animation_data)]
         found += [*as_set(keys, still), [block.frame for block in keys.key_blocks]]
-    return recorded.number_of(found)
+    return records.number_of(found)
 
 
 def reached(things) -> list:

@@ -28,13 +28,13 @@ from ..character.carried import bodies_of, hairs_of
 from ..character.layers import graph_of, layer_of, working_in
 from ..character.placing import world
 from ..drawing.clock import rate_of, shown_frame
-from ..drawing.watched import watched
+from ..drawing.hidden_objects import watched
 from ..objects.lookup import find, named
 from ..objects.relations import found_anew
+from .after_undo import numbers_of
+from .dependencies import frames_of, key_of, moved_by, posture_of, rigging_of
 from .rigging import unreported
-from .sampled_from import frames_of, key_of, moved_by, posture_of, rigging_of
 from .stepping import step, stepping
-from .undone import numbers_of
 
 BLOCK, MANY = 256, 6000
 """Most frames whose poses are converted to channels together, and most joints in all of them: on so few numbers, one frame costs as

@@ -10,7 +10,7 @@ from ...session import session
 from ..drawing.clock import shown_frame
 from ..keys import hair_keys, rotations
 from ..objects.lookup import find
-from .unkeyed import Unkeyed
+from .unkeyed_poses import Unkeyed
 
 
 def step(scene, frame: float) -> None:

@@ -7,7 +7,7 @@ from ...session import session
 from ..character.carried import hairs_of
 from ..character.layers import layer_of, working_in
 from ..objects.lookup import named
-from .sampled_from import edited_unseen, key_of, posture_of, rigging_of
+from .dependencies import edited_unseen, key_of, posture_of, rigging_of
 from .sampling import in_slices
 from .stepping import step, stepping
 

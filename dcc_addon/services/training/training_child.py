@@ -16,7 +16,7 @@ def main() -> int:
     settings = json.load(sys.stdin)
     say = _progress()
     from neuralocks_core.errors import NeuralocksError
-    from neuralocks_core.training.work import abandon
+    from neuralocks_core.training.work_folder import abandon
 
     try:
         (_train_rig if settings["kind"] == "rig" else _train_strands)(settings, say)

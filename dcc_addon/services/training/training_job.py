@@ -13,7 +13,7 @@ from pathlib import Path
 import neuralocks_core
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.time_left import TimeLeft
-from neuralocks_core.training.work import abandon
+from neuralocks_core.training.work_folder import abandon
 
 from .training_check import CAN
 from .training_child import AROUND, LEARNED

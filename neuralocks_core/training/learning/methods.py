@@ -12,14 +12,14 @@ import numpy as np
 
 from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.strands.strand_set import StrandSet
+from neuralocks_core.training.data.farm import RolloutFarm
+from neuralocks_core.training.data.moments import MOMENTS, MomentPool
+from neuralocks_core.training.data.rollouts import TrainingScene
 from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.learning.regression import FIRST, RolloutBank, regress
 from neuralocks_core.training.learning.regression_options import RegressionOptions
 from neuralocks_core.training.learning.selfsupervised import train_on_moments
-from neuralocks_core.training.material.farm import RolloutFarm
-from neuralocks_core.training.material.moments import MOMENTS, MomentPool
-from neuralocks_core.training.material.rollouts import TrainingScene
 from neuralocks_core.training.networks import StrandNet
 
 STEPS_EACH = 10

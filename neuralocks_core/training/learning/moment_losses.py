@@ -15,8 +15,8 @@ from neuralocks_core.physics.energies import Stiffness, Surroundings, energies
 from neuralocks_core.physics.inertia import inertia
 from neuralocks_core.physics.rods import Rods
 from neuralocks_core.physics.self_collision import self_collision
+from neuralocks_core.training.data.moments import Hair, Moment, nearest_planes
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
-from neuralocks_core.training.material.moments import Hair, Moment, nearest_planes
 from neuralocks_core.training.networks import StrandNet, deform
 
 

@@ -19,12 +19,12 @@ from torch import Tensor
 from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.models.network_sizes import K
 from neuralocks_core.strands.strand_set import StrandSet
+from neuralocks_core.training.data.farm import load
+from neuralocks_core.training.data.mirror import POLAR, mirrored_strands, mirrored_vectors
+from neuralocks_core.training.data.rollouts import Rollout, TrainingScene
 from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.learning.regression_losses import regression_losses
 from neuralocks_core.training.learning.regression_options import RegressionOptions
-from neuralocks_core.training.material.farm import load
-from neuralocks_core.training.material.mirror import POLAR, mirrored_strands, mirrored_vectors
-from neuralocks_core.training.material.rollouts import Rollout, TrainingScene
 from neuralocks_core.training.networks import StrandNet, deform
 
 FIRST = 24

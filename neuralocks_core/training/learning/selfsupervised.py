@@ -14,10 +14,10 @@ import numpy as np
 import torch
 
 from neuralocks_core.boundary.spec import BoundarySpec
+from neuralocks_core.training.data.moments import MomentPool
 from neuralocks_core.training.descent import Descended, Schedule, descend
 from neuralocks_core.training.learning.moment_losses import moment_losses
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
-from neuralocks_core.training.material.moments import MomentPool
 from neuralocks_core.training.networks import StrandNet
 
 

@@ -16,8 +16,8 @@ from neuralocks_core.progress import Progress, silent, within
 from neuralocks_core.rig.network import RigModel, rig_spec
 from neuralocks_core.rig.rigging import HairRig
 from neuralocks_core.rig.rods import RigMaterial
+from neuralocks_core.training.data.rollouts import STOPS
 from neuralocks_core.training.descent import Descended
-from neuralocks_core.training.material.rollouts import STOPS
 from neuralocks_core.training.rig.contact import HairOnBodies, contact_weight
 from neuralocks_core.training.rig.deepest import LATE, DeepestPoses
 from neuralocks_core.training.rig.energy import RigEnergy

@@ -84,7 +84,7 @@ def a_part_again(folder: Path) -> None:
     """In a window, the panel tells that hair begins at rest where a part of a shot does that was opened whole, and that a bake's range
     lets it know the whole: then it is as it was.
     """
-    from dcc_addon.scene.motion import sampled_from
+    from dcc_addon.scene.motion import dependencies
 
     rig, scene = scenes.armature(), bpy.context.scene
     scenes.dance(rig)
@@ -93,7 +93,7 @@ def a_part_again(folder: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     rig, strands, scene = bpy.data.objects["Rig"], bpy.data.objects["Hair"], bpy.context.scene
     rests = "Hair begins at rest at frame 12"
-    with patch.object(sampled_from, "bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
+    with patch.object(dependencies, "bpy", SimpleNamespace(app=SimpleNamespace(background=False))):
         make_live(rig, strands)
         whole = points_at(strands, 12)
         assert rests not in " ".join(drawn())

@@ -41,8 +41,8 @@ def not_looked_for_again(_folder: Path) -> None:
     make_live(rig, bpy.data.objects["Hair"])
     before = _known(rig)
     with (
-        patch("dcc_addon.scene.baked.body_known.bodies_of") as look,
-        patch("dcc_addon.scene.baked.body_known._surface") as read,
+        patch("dcc_addon.scene.baked.body_record.bodies_of") as look,
+        patch("dcc_addon.scene.baked.body_record._surface") as read,
     ):
         for move in (
             lambda: setattr(prop, "location", (1, 2, 3)),
@@ -60,7 +60,7 @@ def not_looked_for_again(_folder: Path) -> None:
 
 
 def _known(rig):
-    from dcc_addon.scene.baked.body_known import numbers_of_bodies
+    from dcc_addon.scene.baked.body_record import numbers_of_bodies
 
     bpy.context.view_layer.update()
     return numbers_of_bodies(rig, bpy.context.scene)

@@ -52,7 +52,7 @@ def driven_since(folder: Path) -> None:
 
 def drivers_told(_folder: Path) -> None:
     """Each edit of a driver changes the number of drivers."""
-    from dcc_addon.scene.baked.driven import number_of_drivers
+    from dcc_addon.scene.baked.shape_drivers import number_of_drivers
 
     rig, skin = scenes.dancer_with_shapes()
     curve = skin.data.shape_keys.animation_data.drivers[0]

@@ -88,7 +88,7 @@ def shown_before_its_own_scene(folder: Path) -> None:
 
 def not_drawn_by_another_scene(_folder: Path) -> None:
     """A scene that does not show a character leaves its hair alone, and so does one that has it in an excluded collection."""
-    from dcc_addon.scene.drawing.guests import guests
+    from dcc_addon.scene.drawing.other_scenes import guests
     from dcc_addon.scene.hair import curves
 
     scene = _own(None)
@@ -117,8 +117,8 @@ def named_as_another(folder: Path) -> None:
     there may be ten thousand.
     """
     from dcc_addon.live import view
-    from dcc_addon.scene.drawing import guests
-    from dcc_addon.scene.objects import lively
+    from dcc_addon.scene.drawing import other_scenes
+    from dcc_addon.scene.objects import live_objects
 
     _own(None)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "set.blend"))
@@ -132,10 +132,13 @@ def named_as_another(folder: Path) -> None:
     for drawn, passes in ((None, 1), (behind, 2)):
         scene.background_set = drawn
         graph = bpy.context.evaluated_depsgraph_get()
-        with patch.object(view, "lively", wraps=lively.lively) as looks, patch.object(guests, "lively", looks):
+        with (
+            patch.object(view, "lively", wraps=live_objects.lively) as looks,
+            patch.object(other_scenes, "lively", looks),
+        ):
             view.update(scene, graph)
             assert looks.call_count == passes
-    assert [(thing.name, home) for thing, home in guests.guests(scene)] == [("Hair", behind)]
+    assert [(thing.name, home) for thing, home in other_scenes.guests(scene)] == [("Hair", behind)]
 
 
 def _own(folder):

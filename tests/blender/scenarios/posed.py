@@ -158,7 +158,7 @@ def many_animated(_folder: Path) -> None:
     """In a scene of thousands of animated objects, putting unkeyed values back takes little longer than reading them, since objects
     are not looked up one by one: both are done before and after each slice of sampling.
     """
-    from dcc_addon.scene.motion.unkeyed import Unkeyed
+    from dcc_addon.scene.motion.unkeyed_poses import Unkeyed
 
     action, scene = bpy.data.actions.new("Crowd"), bpy.context.scene
     for number in range(3000):
@@ -179,7 +179,7 @@ def moved_hair(folder: Path) -> None:
     """A hair object that is moved makes the sampling stale, and the bake agrees again; stretched time changes nothing;
     objects that share their curves are refused, and neither is moved.
     """
-    from dcc_addon.scene.motion.sampled_from import key_of
+    from dcc_addon.scene.motion.dependencies import key_of
     from dcc_addon.session import session
 
     rig = scenes.armature()

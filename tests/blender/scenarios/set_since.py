@@ -7,7 +7,7 @@ from unittest import SkipTest
 
 import bpy
 
-from dcc_addon.scene.baked import as_groomed
+from dcc_addon.scene.baked import groom_record
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, bones_at, choose, give_bone_model, make_live, needs_usd
 from tests.blender.panel import told_changed
@@ -62,7 +62,7 @@ def character_set_since(folder: Path) -> None:
             breathe,
         ],
     }
-    assert not as_groomed.changed(strands, scene)  # what it keeps for later drawings, those of the tests lose
+    assert not groom_record.changed(strands, scene)  # what it keeps for later drawings, those of the tests lose
     for what, edits in changes.items():
         for edit in edits:
             for on in (True, False):

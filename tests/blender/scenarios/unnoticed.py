@@ -120,7 +120,7 @@ def many_drivers(_folder: Path) -> None:
     """However many drivers read a rig, what animates it is listed as often as for one: in a control rig with hundreds of them, each
     look at the unkeyed values would otherwise block Blender for seconds.
     """
-    from dcc_addon.scene.motion.sampled_from import posture_of
+    from dcc_addon.scene.motion.dependencies import posture_of
     from dcc_addon.scene.objects.animated import animated
 
     rig, scene = scenes.armature(), bpy.context.scene

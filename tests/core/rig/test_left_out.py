@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from neuralocks_core.rig import find_chains
-from neuralocks_core.rig.finding import left_out
+from neuralocks_core.rig.chain_finding import left_out
 from tests.core.rig.builders import character, ring, skin, tail
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.rig import find_chains
-from neuralocks_core.rig.parting import parted
+from neuralocks_core.rig.mesh_parts import parted
 from neuralocks_core.rig.rigging import moving_joints
 from tests.core.rig.builders import character, skin, tail
 

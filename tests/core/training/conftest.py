@@ -11,7 +11,7 @@ from tests.core.rigs import person, straight_hair
 @pytest.fixture(scope="module")
 def scene():
     """One head with a little straight hair."""
-    from neuralocks_core.training.material.rollouts import TrainingScene  # needs torch: modules without it are skipped
+    from neuralocks_core.training.data.rollouts import TrainingScene  # needs torch: modules without it are skipped
 
     return TrainingScene(person(), (straight_hair(),), frames=60, strands=24)
 
@@ -58,8 +58,8 @@ class _Farm:
         return False
 
     def _make(self, path: Path) -> None:
-        from neuralocks_core.training.material.farm import save
-        from neuralocks_core.training.material.rollouts import RolloutMaker
+        from neuralocks_core.training.data.farm import save
+        from neuralocks_core.training.data.rollouts import RolloutMaker
 
         self._maker = self._maker or RolloutMaker(self._scene)
         save(path, self._maker.make(int(path.stem)))

@@ -12,13 +12,13 @@ from neuralocks_core.models.network_sizes import CODE
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
+from neuralocks_core.training.data.farm import save
+from neuralocks_core.training.data.mirror import POLAR, mirrored_strands, mirrored_vectors
+from neuralocks_core.training.data.rollouts import RolloutMaker, in_steps
 from neuralocks_core.training.learning import methods, regression
 from neuralocks_core.training.learning.methods import samples
 from neuralocks_core.training.learning.regression import RolloutBank
 from neuralocks_core.training.learning.regression_options import RegressionOptions
-from neuralocks_core.training.material.farm import save
-from neuralocks_core.training.material.mirror import POLAR, mirrored_strands, mirrored_vectors
-from neuralocks_core.training.material.rollouts import RolloutMaker, in_steps
 
 
 def test_hair_that_moves_by_metres_is_learned_as_it_moved(scene):

@@ -11,7 +11,7 @@ torch = pytest.importorskip("torch")
 
 from neuralocks_core.errors import NeuralocksError  # noqa: E402
 from neuralocks_core.training import checkpoint
-from neuralocks_core.training.material import farm  # noqa: E402
+from neuralocks_core.training.data import farm  # noqa: E402
 from neuralocks_core.training.muon import muon  # noqa: E402
 
 NAN = np.float32(np.nan)

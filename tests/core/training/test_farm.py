@@ -19,9 +19,9 @@ pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models.network_sizes import K
 from neuralocks_core.training import checkpoint
+from neuralocks_core.training.data import farm
+from neuralocks_core.training.data.rollouts import FINEST, Rollout
 from neuralocks_core.training.learning import methods
-from neuralocks_core.training.material import farm
-from neuralocks_core.training.material.rollouts import FINEST, Rollout
 
 
 def farm_of(monkeypatch, folder, *processes):

@@ -11,8 +11,8 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 from neuralocks_core.materials import NO_PLANE
 from neuralocks_core.models.network_sizes import K
 from neuralocks_core.training import gauge
+from neuralocks_core.training.data.farm import Rollout
 from neuralocks_core.training.learning.regression import predicted
-from neuralocks_core.training.material.farm import Rollout
 
 HISTORY, FIRST, STEP = slice(2, 4), 5, 2.0**-12
 LENGTH = np.array([0.2, 0.4, 0.3], np.float32)

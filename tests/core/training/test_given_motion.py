@@ -15,7 +15,7 @@ from neuralocks_core.motion import Clip
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("warp", reason="the extra 'train' is not installed")
-from neuralocks_core.training.material.rollouts import PREROLL, RolloutMaker
+from neuralocks_core.training.data.rollouts import PREROLL, RolloutMaker
 
 
 def captured_of(scene, clip, count):
@@ -65,7 +65,7 @@ def test_made_up_motion_has_the_gestures_wanted_and_stops(scene, monkeypatch):
     maker = RolloutMaker(replace(scene, frames=110, gestures={kind: float(kind == "walk") for kind in KINDS}))
     standing = []
     for share in (0.0, 1.0):
-        monkeypatch.setattr("neuralocks_core.training.material.rollouts.STOPS", share)
+        monkeypatch.setattr("neuralocks_core.training.data.rollouts.STOPS", share)
         clips = [maker.draw(i).clip for i in range(10)]
         gone = [np.linalg.norm(np.ptp(clip.joints[:, 0, :3, 3], axis=0)) for clip in clips]
         assert min(gone) > 0.3

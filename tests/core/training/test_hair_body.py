@@ -9,7 +9,7 @@ from neuralocks_core.character import Character, Skeleton
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.rotation import unit
 from neuralocks_core.skinned_body import Body
-from neuralocks_core.training.material.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.data.hair_body import hair_body, posed_over_time
 
 from .. import rigs
 

@@ -9,7 +9,7 @@ from neuralocks_core.boundary.history import BoundarySampler
 from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands.strand_set import scalp_local
-from neuralocks_core.training.material.mirror import POLAR, mirrored_strands, mirrored_vectors
+from neuralocks_core.training.data.mirror import POLAR, mirrored_strands, mirrored_vectors
 
 from ..rigs import bind, person, straight_hair
 

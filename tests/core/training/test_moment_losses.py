@@ -15,12 +15,12 @@ from neuralocks_core.character import Character
 from neuralocks_core.materials import MARGIN, Material
 from neuralocks_core.models.network_sizes import CODE, STRAND, K
 from neuralocks_core.skinned_body import Body
+from neuralocks_core.training.data.moments import MomentPool, nearest_planes
+from neuralocks_core.training.data.rollouts import TrainingScene
 from neuralocks_core.training.learning import methods
 from neuralocks_core.training.learning.methods import MomentMethod
 from neuralocks_core.training.learning.moment_losses import moment_losses
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
-from neuralocks_core.training.material.moments import MomentPool, nearest_planes
-from neuralocks_core.training.material.rollouts import TrainingScene
 from tests.core.rigs import HEAD, bind, person, straight_hair
 
 OPTIONS = SelfSupervisedOptions(output="displacement", supported=False, random_materials=False, volume=0.0)

@@ -17,7 +17,7 @@ from neuralocks_core.measures import HIGHEST, LOWEST, MEASURES, body_measures
 from neuralocks_core.reference.solver import SimulatedHair
 from neuralocks_core.skinned_body import Body
 from neuralocks_core.strands.locks import lock_mates
-from neuralocks_core.training.material.rollouts import PREROLL, SHAPES, RolloutMaker, TrainingScene, learned_measures
+from neuralocks_core.training.data.rollouts import PREROLL, SHAPES, RolloutMaker, TrainingScene, learned_measures
 from tests.core.rigs import HEAD, bind, person, straight_hair
 
 RADIUS = 0.09
@@ -63,9 +63,7 @@ def test_half_of_the_bodies_have_other_shapes_and_a_third_moves_as_given():
 def test_the_body_reaches_below_the_longest_hair_of_all_grooms(monkeypatch):
     reaches, short = [], straight_hair()
     long = replace(short, rest=short.rest * np.float32([1, 3, 1]))
-    monkeypatch.setattr(
-        "neuralocks_core.training.material.rollouts.hair_body", lambda who, reach: reaches.append(reach)
-    )
+    monkeypatch.setattr("neuralocks_core.training.data.rollouts.hair_body", lambda who, reach: reaches.append(reach))
     for grooms in ((short, long), (long, short)):
         RolloutMaker(TrainingScene(headed(), grooms))
     assert reaches == pytest.approx([0.2 - float(long.rest[..., 1].min())] * 2) and reaches[0] > 0.5

@@ -11,9 +11,9 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models.network_sizes import STRAND
 from neuralocks_core.training import run
+from neuralocks_core.training.data.rollouts import TrainingScene
 from neuralocks_core.training.descent import Descended
 from neuralocks_core.training.learning.regression_options import RegressionOptions
-from neuralocks_core.training.material.rollouts import TrainingScene
 from neuralocks_core.training.run import HELD, Run
 from tests.core.rigs import person, straight_hair
 

@@ -13,11 +13,11 @@ from neuralocks_core.deformation.strand_session import strand_inputs
 from neuralocks_core.mesh import vertex_normals
 from neuralocks_core.physics.bend_twist import Cosserat
 from neuralocks_core.skinned_body import Body
+from neuralocks_core.training.data.moments import MomentPool, nearest_planes
+from neuralocks_core.training.data.rollouts import TrainingScene
 from neuralocks_core.training.learning.moment_losses import moment_losses
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.learning.selfsupervised import paper_boundary, train_on_moments
-from neuralocks_core.training.material.moments import MomentPool, nearest_planes
-from neuralocks_core.training.material.rollouts import TrainingScene
 from neuralocks_core.training.networks import StrandNet
 from tests.core.rigs import HEAD, bind, person, straight_hair
 

@@ -19,13 +19,13 @@ from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.deformation.strand_session import StrandSession
 from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.training import checkpoint
+from neuralocks_core.training.data.farm import load, save
+from neuralocks_core.training.data.rollouts import RolloutMaker, held_out_split, kept_from_training
 from neuralocks_core.training.learning import methods
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.learning.regression_options import RegressionOptions
-from neuralocks_core.training.material.farm import load, save
-from neuralocks_core.training.material.rollouts import RolloutMaker, held_out_split, kept_from_training
 from neuralocks_core.training.train import train_strands
-from neuralocks_core.training.work import claimed
+from neuralocks_core.training.work_folder import claimed
 
 
 def test_a_rollout_depends_on_its_number_alone(scene, tmp_path):

@@ -10,7 +10,7 @@ import trimesh
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from neuralocks_core.body.collider import Collider
-from neuralocks_core.deformation.suited import suited
+from neuralocks_core.deformation.model_choice import suited
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.hairstyles import STYLES
 from neuralocks_core.rotation import from_vector, transformed

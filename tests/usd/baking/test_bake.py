@@ -7,7 +7,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
 
 from usd.baking.bake import bake
 from usd.border.stage_files import open_stage
-from usd.shot.bakes.recorded import CARRIER
+from usd.shot.bakes.bake_record import CARRIER
 from usd.skel.binding import FORMER
 
 from ..shots import HEAD, Recipe, samples, strand_points, world_points, write_shot

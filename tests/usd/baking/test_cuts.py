@@ -15,7 +15,7 @@ from usd.cli.options import cut_codes
 from usd.review.baked import read_baked
 from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
-from usd.shot.bakes.recorded import recorded
+from usd.shot.bakes.bake_record import recorded
 from usd.shot.stage import read_shot
 
 from ..shots import Recipe, samples, write_loop, write_shot

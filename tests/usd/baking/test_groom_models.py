@@ -12,7 +12,7 @@ from usd.baking import groom_models
 from usd.baking.bake import bake
 from usd.border.stage_files import open_stage
 from usd.models.export import export_model
-from usd.shot.bakes.recorded import recorded
+from usd.shot.bakes.bake_record import recorded
 from usd.shot.stage import read_shot
 
 from ..shots import HAIR, samples, write_shot

@@ -12,8 +12,8 @@ from neuralocks_core.models.runtime import StrandModel
 from usd.baking.bake import bake
 from usd.baking.model_notes import model_notes
 from usd.review.inspect import inspect
+from usd.shot.notes import character_notes
 from usd.shot.stage import read_shot
-from usd.shot.telling import character_notes
 
 from ..shots import Recipe, write_shot
 

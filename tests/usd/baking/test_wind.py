@@ -19,7 +19,7 @@ from usd.review.picture import preview
 from usd.rig.bake import bake_rig
 from usd.rig.evaluate import evaluate_rig
 from usd.rig.stage import read_rigged_hair
-from usd.shot.bakes.recorded import KEY
+from usd.shot.bakes.bake_record import KEY
 
 from ..commands import status
 from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot

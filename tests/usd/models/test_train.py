@@ -13,9 +13,9 @@ from neuralocks_core.models import model_file
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
+from neuralocks_core.training.data.rollouts import TrainingScene
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.learning.regression_options import RegressionOptions
-from neuralocks_core.training.material.rollouts import TrainingScene
 from usd.assets.grow import grow
 from usd.cli.train import one_by_one
 from usd.models.clip_file import read_clip

@@ -14,7 +14,7 @@ pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 from neuralocks_core.training.learning.moment_options import SelfSupervisedOptions
 from neuralocks_core.training.learning.regression_options import RegressionOptions
 from neuralocks_core.training.learning.selfsupervised import paper_boundary
-from neuralocks_core.training.work import BEGINNING, folder_beside
+from neuralocks_core.training.work_folder import BEGINNING, folder_beside
 from tests.strand_models import write_random_model
 from usd.models.train import begins_with, parsed, train
 

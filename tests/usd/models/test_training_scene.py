@@ -80,7 +80,7 @@ def test_motion_that_is_long_enough_is_not_told(tmp_path, monkeypatch):
     shot = write_shot(tmp_path, Recipe(bound="mesh"))
     for least, short in ((0.6, True), (0.05, False)):
         told = []
-        monkeypatch.setattr("neuralocks_core.training.material.rollouts.LEAST", least)
+        monkeypatch.setattr("neuralocks_core.training.data.rollouts.LEAST", least)
         training_scene(shot, motion=[shot], tell=told.extend)
         assert any("too short to learn from" in note for note in told) == short
 

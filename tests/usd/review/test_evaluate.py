@@ -15,7 +15,7 @@ from usd.review.baked import read_baked
 from usd.review.demo import shipped_shot
 from usd.review.evaluate import evaluate
 from usd.review.inspect import inspect
-from usd.shot.bakes.recorded import record, recorded
+from usd.shot.bakes.bake_record import record, recorded
 
 from ..shots import Recipe, write_shot
 

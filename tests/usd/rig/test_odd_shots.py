@@ -10,7 +10,7 @@ from usd.review.facts_text import as_text
 from usd.review.inspect import inspect
 from usd.rig.bake import bake_rig
 from usd.rig.stage import read_rigged_hair
-from usd.shot.telling.character_notes import weight_notes
+from usd.shot.notes.character_notes import weight_notes
 
 from ..rig_shots import hair_turns, model_for, small_shot
 

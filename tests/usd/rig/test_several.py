@@ -15,7 +15,7 @@ from neuralocks_core.rig.network import RigSampler
 from usd.border.stopping import stoppable
 from usd.rig.bake import bake_rig
 from usd.rig.stage import BAKED, read_rigged_hair, read_rigged_hairs
-from usd.shot.telling.lacking import has_hair_joints
+from usd.shot.notes.missing import has_hair_joints
 
 from ..rig_shots import EXAMPLE, hair_turns, model_for, small_shot
 

@@ -10,9 +10,9 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.models.model_file import shipped
 from neuralocks_core.rig import RigModel, rig_spec
 from usd.models.train import train
-from usd.rig.beginning import Beginning
 from usd.rig.stage import read_rigged_hair
 from usd.rig.train import train_rig
+from usd.rig.warm_start import Beginning
 
 from ...core.rig.builders import random_model, random_rig_model
 from ..rig_shots import EXAMPLE, small_shot
@@ -120,7 +120,7 @@ def test_a_model_of_another_network_or_other_chains_is_refused(tmp_path, monkeyp
         model
     )
     for few, named in ((4, "".join(f"--chains {top} " for top in tops[:4]) + "..."), (5, f"--chains {tops[4]}")):
-        monkeypatch.setattr("usd.rig.beginning._FEW", few)
+        monkeypatch.setattr("usd.rig.warm_start._FEW", few)
         with pytest.raises(
             NeuralocksError, match=rf"name its chains as in its training \(.*{named}\), or train without"
         ):

@@ -15,8 +15,8 @@ from neuralocks_core.strands.arclength import resample
 from usd.border.units import Border
 from usd.review.groom_facts import groom_facts
 from usd.review.inspect import inspect
+from usd.shot.notes.groom_notes import groom_notes
 from usd.shot.stage import read_rigs, read_shot
-from usd.shot.telling.groom_notes import groom_notes
 
 from ..shots import HEAD, POSITIONS, Recipe, write_shot
 

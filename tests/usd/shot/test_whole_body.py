@@ -9,8 +9,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from usd.baking.bake import bake
 from usd.review.inspect import inspect
+from usd.shot.notes.shot_notes import partial_body
 from usd.shot.stage import read_shot
-from usd.shot.telling.notes import partial_body
 
 from ..shots import HAIR, Recipe, world_points, write_shot
 

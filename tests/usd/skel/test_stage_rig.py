@@ -12,8 +12,8 @@ from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
 from usd.border.time_codes import time_codes
+from usd.shot.notes.shot_notes import out_of_range
 from usd.shot.stage import read_rigs, read_shot
-from usd.shot.telling.notes import out_of_range
 from usd.skel.source import find_skeletons
 
 from ..shots import Recipe, write_loop, write_shot

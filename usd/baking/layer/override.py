@@ -14,7 +14,7 @@ from ...border.arrays import vectors
 from ...border.damage import named
 from ...border.stage_files import refresh_open
 from ...border.stopping import check
-from ...shot.bakes.recorded import CARRIER, record
+from ...shot.bakes.bake_record import CARRIER, record
 from ...shot.made_from import INPUTS, made_from
 from ...shot.stage import Shot, StageGroom
 from ...shot.strands.curves import rest_points, widest_sample

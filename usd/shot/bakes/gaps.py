@@ -5,7 +5,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from ...border.time_codes import NEAR
-from .recorded import recorded
+from .bake_record import recorded
 
 
 def gaps(codes: list[float], frame: float, stage: Usd.Stage | None = None) -> list[str]:

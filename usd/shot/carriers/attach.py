@@ -21,10 +21,10 @@ from ...skel.joints import JointSource
 from ...skel.stage_rig import StageRig
 from ..strands.curve_ends import beyond_ends, ends
 from ..strands.curves import moment, rest_points
-from .alike import one_of_alike
 from .carrying import carried_by, carrying_joint, followed_joint, head_by_name, joint_shares, spread_over
 from .seat import NEAR, Seat, begins_where_drawn, find_seat, kinship, some_ends, unsure
 from .seat_notes import astray, lies_off_skin, not_pinned, strays, upside_down
+from .twin_bodies import one_of_alike
 from .ways import CLEARLY, ways
 
 ON_HEAD = 0.3

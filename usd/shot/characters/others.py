@@ -13,7 +13,7 @@ from neuralocks_core.errors import NeuralocksError
 from ...skel.joints import JointSource
 from ...skel.source import find_skeletons
 from ...skel.stage_rig import StageRig
-from ..carriers.alike import SAME, UPPER
+from ..carriers.twin_bodies import SAME, UPPER
 from .skeletons import read_each_rig
 
 

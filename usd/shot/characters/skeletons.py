@@ -13,7 +13,7 @@ from ...border.units import Border
 from ...skel.source import read_rig
 from ...skel.stage_rig import StageRig
 from ...skel.surface import find_skins
-from ..bakes.recorded import recorded_joint
+from ..bakes.bake_record import recorded_joint
 from ..carriers.attach import bound_joint
 from ..strands.curves import find_curves, rest_points, without_points
 

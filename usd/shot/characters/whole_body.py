@@ -11,8 +11,8 @@ from neuralocks_core.character import Character
 from neuralocks_core.skinned_body import Body
 
 from ...skel.stage_rig import StageRig
-from ..carriers.alike import SAME, one_person
 from ..carriers.attach import Attachment
+from ..carriers.twin_bodies import SAME, one_person
 
 PROBES = 5
 """Times at which joints of two skeletons are compared, evenly over the animation."""

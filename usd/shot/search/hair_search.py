@@ -12,16 +12,16 @@ from neuralocks_core.errors import NeuralocksError
 from ...border.placement import Placement, Unplaced
 from ...skel.binding import bound_skeleton
 from ...skel.stage_rig import StageRig
-from ..bakes.recorded import recorded_skeleton
+from ..bakes.bake_record import recorded_skeleton
 from ..carriers.attach import Attachment, attach, of_another
 from ..carriers.seat_notes import coarsely_placed
 from ..characters.others import Others
 from ..characters.unusable import Unusable, find_unusable, lies_on
+from ..notes.character_notes import unevenly_scaled
+from ..notes.groom_notes import another_binds, another_carries, far_from_named, no_points, too_far, unusable_skeleton
+from ..notes.shot_notes import few
 from ..strands.curve_ends import undrawn
 from ..strands.curves import left_as_they_are, without_points
-from ..telling.character_notes import unevenly_scaled
-from ..telling.groom_notes import another_binds, another_carries, far_from_named, no_points, too_far, unusable_skeleton
-from ..telling.notes import few
 from .other_curves import drawn_as_copies, other_hair
 from .rig_controls import controls_left_out, is_closed, is_lone_guide, moved_as_open
 

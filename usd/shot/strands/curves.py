@@ -14,7 +14,7 @@ from neuralocks_core.rotation import transformed
 from ...border.prim_paths import prim_paths, some_paths
 from ...border.values import as_numbers
 from ...skel.binding import rest_primvar, rest_value
-from ..bakes.recorded import recorded
+from ..bakes.bake_record import recorded
 
 NONE = "none (no BasisCurves)"
 

@@ -17,14 +17,14 @@ pytest.importorskip("warp", reason="the extra 'train' is not installed")
 from neuralocks_core.boundary.spec import BoundarySpec
 from neuralocks_core.models.network_sizes import PLAIN_STRAND, STRAND
 from neuralocks_core.training.autoencoder import StrandAutoencoder
-from neuralocks_core.training.beginning import Beginning
+from neuralocks_core.training.data.rollouts import TrainingScene
 from neuralocks_core.training.export import strand_graphs
 from neuralocks_core.training.learning import methods
 from neuralocks_core.training.learning.regression_options import RegressionOptions
-from neuralocks_core.training.material.rollouts import TrainingScene
 from neuralocks_core.training.networks import StrandNet
 from neuralocks_core.training.train import train_strands
-from neuralocks_core.training.work import keep_beginning
+from neuralocks_core.training.warm_start import Beginning
+from neuralocks_core.training.work_folder import keep_beginning
 
 SPEC = BoundarySpec()
 

@@ -14,9 +14,9 @@ from neuralocks_core.rig.network import RigModel
 from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
+from ..shot.notes.character_notes import lies_down
+from ..shot.notes.shot_notes import not_animated, on_twos, without_turn
 from ..shot.stage import check_frames_named, frame_range
-from ..shot.telling.character_notes import lies_down
-from ..shot.telling.notes import not_animated, on_twos, without_turn
 from ..skel.clip_codes import SAME
 from ..skel.old_copy import outdated_note
 from ..skel.rig_copy import outdated_of

@@ -4,12 +4,12 @@
 import numpy as np
 
 from neuralocks_core.anatomy.joint_names import carrier, leaf
+from neuralocks_core.rig.chain_finding import UNNAMED, left_out, of_the_body
 from neuralocks_core.rig.chains import HairChains
-from neuralocks_core.rig.finding import UNNAMED, left_out, of_the_body
 from neuralocks_core.rig.hair_names import says_face, says_hair_alone
 from neuralocks_core.skinned_body import LEAST_WEIGHT, Body
 
-from ..shot.telling.notes import heads_above
+from ..shot.notes.shot_notes import heads_above
 from ..skel.stage_rig import StageRig
 
 

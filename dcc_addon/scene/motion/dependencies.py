@@ -3,11 +3,11 @@
 
 import bpy
 
-from ...kept import Key
+from ...live_state import Key
 from ...session import session
 from ..character.carried import bodies_of, hairs_of
 from ..drawing.clock import rate_of, stretch_of
-from ..drawing.shown import enabled
+from ..drawing.visibility import enabled
 from ..objects.animated import animated
 from .rigging import posture, reached, rigging, unreported
 

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from dcc_addon.scene.objects.remembered import are_numbers, remembered
+from dcc_addon.scene.objects.stored_values import are_numbers, remembered
 
 
 def test_values_come_back_by_name_where_they_fit():

@@ -11,7 +11,7 @@ import numpy as np
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.rotation import inverse, transformed
 
-from ..kept import Followed, Written
+from ..live_state import Followed, Written
 from ..scene.character.armature import matrix
 from ..scene.hair import curves
 from ..scene.objects.lookup import identity

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bodies that hair is kept out of, as numbers of a record; see `recorded`. The panel asks in every redraw, and looking for them in
+"""The bodies that hair is kept out of, as numbers of a record; see `records`. The panel asks in every redraw, and looking for them in
 a large scene, or reading a large one, takes longer than that may take: both are done again only after an edit that may change them.
 """
 
@@ -9,12 +9,12 @@ from ...session import session
 from ..character.binding import deforming
 from ..character.body import number_of, number_of_shape, weighed_so
 from ..character.carried import bodies_of
+from ..motion.ground_shapes import follows
 from ..motion.rigging import number_of_keys
-from ..motion.shapes import follows
-from ..objects import recorded
+from ..objects import records
 from ..objects.animated import animated, curves_of, is_muted
 from ..objects.lookup import identity
-from .driven import number_of_drivers
+from .shape_drivers import number_of_drivers
 
 SHAPED = bpy.types.Mesh, bpy.types.Key
 _KINDS = "Armature", "Camera", "Curve", "Curves", "Image", "Light", "Material", "NodeTree", "Texture", "World"
@@ -35,7 +35,7 @@ def numbers_of_bodies(armature, scene) -> tuple[int | None, int | None]:
         bodies = bodies_of(armature, scene)
         shapes, driven = sorted(map(_number_of, bodies)), [number_of_drivers(body.data) for body in bodies]
         known = bodies or any(armature in deforming(thing) for thing in scene.objects if thing.type == "MESH")
-        numbers = recorded.number_of(shapes), recorded.number_of(sorted(filter(None, driven)))
+        numbers = records.number_of(shapes), records.number_of(sorted(filter(None, driven)))
         session.read.bodies[key] = numbers if known else (None, None)
     return session.read.bodies[key]
 
@@ -77,7 +77,7 @@ def _number_of(body) -> int:
         session.read.surfaces.get(mesh.name_full),
     )
     if known is None or known[0] != moving:
-        known = session.read.surfaces[mesh.name_full] = moving, recorded.number_of(_surface(body))
+        known = session.read.surfaces[mesh.name_full] = moving, records.number_of(_surface(body))
     return known[1]
 
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from neuralocks_core.rotation import inverse, transformed
 
-from ..kept import Stood
+from ..live_state import Stood
 from ..scene.character.armature import matrix
 from ..scene.hair import curves
 from ..scene.objects.lookup import identity
 from ..session import session
-from .edited import ROUNDING
+from .point_edits import ROUNDING
 
 
 def remember(hair, rest: int) -> None:

@@ -9,9 +9,9 @@ from ...services.panel.sliders import SLIDERS
 from ...session import session
 from ..hair.curves import points
 from ..motion.rigging import hangs, stands
-from ..objects import recorded
+from ..objects import records
 from ..objects.animated import animated
-from . import as_carried, body_known
+from . import body_record, character_record
 
 KEY = "neuralocks_groomed"
 """The property of the object: a number for each part."""
@@ -20,7 +20,7 @@ KEY = "neuralocks_groomed"
 def remember(hair, scene) -> None:
     """Note what the hair is in a scene, unless it belongs to another file."""
     if hair.library is None:
-        hair[KEY] = recorded.as_text(_numbers(hair, scene))
+        hair[KEY] = records.as_text(_numbers(hair, scene))
 
 
 def forget(hair) -> None:
@@ -31,20 +31,20 @@ def forget(hair) -> None:
 
 def changed(hair, scene) -> list[str]:
     """What was changed since the cache was baked; nothing if that is unknown."""
-    return recorded.changed(hair.get(KEY, ""), _numbers(hair, scene))
+    return records.changed(hair.get(KEY, ""), _numbers(hair, scene))
 
 
 def _numbers(hair, scene) -> dict[str, int | None]:
     armature, moving = hair.neuralocks_hair.armature, animated(hair.animation_data)
-    body, driven = body_known.numbers_of_bodies(armature, scene) if armature else (0, 0)
+    body, driven = body_record.numbers_of_bodies(armature, scene) if armature else (0, 0)
     return {
         "groom": _number_of(hair.data),
-        "place": recorded.number_of([*hangs(hair), *stands(hair, moving)]),
+        "place": records.number_of([*hangs(hair), *stands(hair, moving)]),
         "sliders": _sliders(hair),
-        "wind": as_carried.wind(armature),
-        **as_carried.others(armature, scene),
+        "wind": character_record.wind(armature),
+        **character_record.others(armature, scene),
         "body": body,
-        "Model": as_carried.model(hair, "strands"),
+        "Model": character_record.model(hair, "strands"),
         "drivers of the body": driven,
     }
 
@@ -52,7 +52,7 @@ def _numbers(hair, scene) -> dict[str, int | None]:
 def _sliders(hair) -> int:
     own, moving = hair.neuralocks_hair, animated(hair.animation_data)
     set_so = [round(getattr(own, s.name), 6) for s in SLIDERS if f"neuralocks_hair.{s.name}" not in moving]
-    return recorded.number_of([*set_so, own.resolve])
+    return records.number_of([*set_so, own.resolve])
 
 
 def _number_of(data) -> int:

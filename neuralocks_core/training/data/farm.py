@@ -18,7 +18,7 @@ from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.files import read_npz, replace_npz
 from neuralocks_core.materials import RANGES
 from neuralocks_core.models.network_sizes import K
-from neuralocks_core.training.material.rollouts import FINEST, Rollout, RolloutMaker, TrainingScene
+from neuralocks_core.training.data.rollouts import FINEST, Rollout, RolloutMaker, TrainingScene
 
 
 class RolloutFarm:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes that one render draws together."""
 
-from .guests import homes
+from .other_scenes import homes
 
 
 def drawn_with(scene) -> list:

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from neuralocks_core.deformation import suited as module
-from neuralocks_core.deformation.suited import suited
+from neuralocks_core.deformation import model_choice as module
+from neuralocks_core.deformation.model_choice import suited
 from neuralocks_core.errors import NeuralocksError
 from neuralocks_core.groom import Groom
 from neuralocks_core.models import model_file

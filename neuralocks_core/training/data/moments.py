@@ -21,8 +21,8 @@ from neuralocks_core.motion import GRAVITY
 from neuralocks_core.physics.rods import Rods, rods
 from neuralocks_core.physics.self_collision import density
 from neuralocks_core.strands.locks import lock_mates, neighbours
-from neuralocks_core.training.material.hair_body import posed_over_time
-from neuralocks_core.training.material.rollouts import RolloutMaker, TrainingScene
+from neuralocks_core.training.data.hair_body import posed_over_time
+from neuralocks_core.training.data.rollouts import RolloutMaker, TrainingScene
 
 MOMENTS = 6
 """Moments taken from each random clip."""

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import bpy
 
 from ...session import session
-from .shown import enabled
+from .visibility import enabled
 
 
 @contextmanager

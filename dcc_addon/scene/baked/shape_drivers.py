@@ -7,7 +7,7 @@ import bpy
 
 from ..motion.rigging import shape_of
 from ..objects.animated import is_muted
-from ..objects.recorded import number_of
+from ..objects.records import number_of
 
 _MEMBER = re.compile(r'(\w)\["((?:\\.|[^"\\])*)"\]')
 """A bone or the like in a path. Blender writes another name there if it gets one; custom properties are named without a word before."""

@@ -9,7 +9,7 @@ import trimesh
 
 from neuralocks_core.mesh import rays_through
 from neuralocks_core.rig import find_chains
-from neuralocks_core.rig.parting import parted
+from neuralocks_core.rig.mesh_parts import parted
 from neuralocks_core.rig.rigging import HairRig, assemble_rig
 from neuralocks_core.skinned_body import Body
 

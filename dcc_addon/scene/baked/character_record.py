@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves hair, strands and bones alike: what a character is set to, and a model, as numbers of a record; see `recorded`."""
+"""What moves hair, strands and bones alike: what a character is set to, and a model, as numbers of a record; see `records`."""
 
 from ...services.hair.wind import Blowing
 from ..character.examined import examined
 from ..files.paths import MODELS, full, library_of
-from ..objects.recorded import number_of
-from .as_baked import print_of
+from ..objects.records import number_of
+from .motion_record import print_of
 
 
 def wind(armature) -> int:

@@ -20,7 +20,7 @@ from neuralocks_core.lock_file import FolderLock
 from neuralocks_core.models import model_file
 
 if TYPE_CHECKING:  # cleaning up after a training needs no solver
-    from neuralocks_core.training.material.rollouts import TrainingScene
+    from neuralocks_core.training.data.rollouts import TrainingScene
 
 BEGINNING = "begin.neuralocks"
 """In the work folder: the model that a training starts from."""
@@ -143,7 +143,7 @@ def keep_inputs(scene: TrainingScene, work: Path, resume: bool) -> None:
 
 def _inputs(scene: TrainingScene) -> dict:
     from neuralocks_core.reference.solver import INTEGRATOR
-    from neuralocks_core.training.material.rollouts import STOPS
+    from neuralocks_core.training.data.rollouts import STOPS
 
     character, clips = scene.character, scene.clips
     body, skeleton = character.body, character.skeleton

@@ -25,7 +25,7 @@ from neuralocks_core.measures import body_measures
 from neuralocks_core.motion import Clip
 from neuralocks_core.strands.locks import lock_mates
 from neuralocks_core.strands.strand_set import StrandSet
-from neuralocks_core.training.material.hair_body import hair_body, posed_over_time
+from neuralocks_core.training.data.hair_body import hair_body, posed_over_time
 
 FINEST = 2.0**-15
 """[m] Displacements are multiples of this step, 0.03 mm, in two bytes; longer hair, which would not fit, has a larger step."""

@@ -4,8 +4,8 @@ showing these as they were.
 """
 
 from ..keys import hair_keys
-from ..objects import recorded
-from . import as_baked, as_carried
+from ..objects import records
+from . import character_record, motion_record
 
 KEY = "neuralocks_keyed"
 """The property of the action: a number for each part."""
@@ -14,13 +14,13 @@ REMEDY = "Bake to Keyframes"
 
 def remember(action, armature, scene, frames: tuple[int, int]) -> None:
     """Store with a bake of these frames, first and last, what it was made of."""
-    as_baked.remember(action, armature, scene, frames)
-    action[KEY] = recorded.as_text(_numbers(armature, scene))
+    motion_record.remember(action, armature, scene, frames)
+    action[KEY] = records.as_text(_numbers(armature, scene))
 
 
 def changed_since(armature, scene) -> str:
     """What was changed since hair keys that play were baked, and shows in this frame, with the remedy; empty if nothing is known to be."""
-    return as_baked.changed(hair_keys.stored(armature, as_baked.KEY), armature, scene, REMEDY)
+    return motion_record.changed(hair_keys.stored(armature, motion_record.KEY), armature, scene, REMEDY)
 
 
 def note(armature, scene) -> str:
@@ -28,16 +28,16 @@ def note(armature, scene) -> str:
     if armature.neuralocks_character.rig_live:
         return ""
     told = hair_keys.stored(armature, KEY)
-    parts = [] if told is None else recorded.changed(told, _numbers(armature, scene))
-    return recorded.note(parts, REMEDY) if parts else ""
+    parts = [] if told is None else records.changed(told, _numbers(armature, scene))
+    return records.note(parts, REMEDY) if parts else ""
 
 
 def _numbers(armature, scene) -> dict[str, int]:
     own = armature.neuralocks_character
     return {
-        "Motion": recorded.number_of(round(own.rig_motion, 6)),
-        "Model": as_carried.model(armature, "rig"),
-        "Chains": recorded.number_of(own.chains),
-        "wind": as_carried.wind(armature),
-        **as_carried.others(armature, scene),
+        "Motion": records.number_of(round(own.rig_motion, 6)),
+        "Model": character_record.model(armature, "rig"),
+        "Chains": records.number_of(own.chains),
+        "wind": character_record.wind(armature),
+        **character_record.others(armature, scene),
     }

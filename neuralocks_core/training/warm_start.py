@@ -20,7 +20,7 @@ from neuralocks_core.models.onnx_graph import OnnxWeights
 from neuralocks_core.training import checkpoint
 from neuralocks_core.training.autoencoder import StrandAutoencoder
 from neuralocks_core.training.networks import StrandNet, smoothing
-from neuralocks_core.training.work import BEGINNING, CODES
+from neuralocks_core.training.work_folder import BEGINNING, CODES
 
 
 class Beginning:

@@ -5,7 +5,7 @@ is at the frame of the scene that draws it, and moves as in its own scene.
 
 import bpy
 
-from ..objects.lively import Lively, lively
+from ..objects.live_objects import Lively, lively
 
 
 def guests(scene, own: Lively | None = None) -> list[tuple]:

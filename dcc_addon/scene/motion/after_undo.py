@@ -10,9 +10,9 @@ from ...sampled_rig import SampledRig
 from ...services.rigs.rig import same_arrays
 from ...session import session
 from ..character.body import read
-from ..objects import recorded
+from ..objects import records
 from ..objects.animated import curves_in, is_muted
-from ..objects.keyed import concerns
+from ..objects.keyed_motion import concerns
 from ..objects.lookup import find
 from ..objects.settings import as_set, settings_of
 from .rigging import unreported
@@ -56,7 +56,7 @@ def _as_read(arrays, name: str, sampled: SampledRig) -> bool:
 
 
 def _number_of(action) -> int:
-    return recorded.number_of([_curve(curve) for curve in curves_in(action)])
+    return records.number_of([_curve(curve) for curve in curves_in(action)])
 
 
 def _curve(curve) -> list:

@@ -6,19 +6,19 @@ names, as evaluated.
 import bpy
 
 from . import background
-from .live.edited import touched
 from .live.live_strands import EDITING, known
-from .scene.baked import body_known
-from .scene.motion.shapes import follows
-from .scene.motion.undone import as_sampled
-from .scene.objects.keyed import concerns
+from .live.point_edits import touched
+from .scene.baked import body_record
+from .scene.motion.after_undo import as_sampled
+from .scene.motion.ground_shapes import follows
+from .scene.objects.keyed_motion import concerns
 from .scene.objects.lookup import find
 from .session import session
 
 
 def forget_data(graph, renewed: bool) -> None:
     """Weights and shapes of meshes, and points of grooms, that were edited are read again."""
-    body_known.updated(graph.updates)
+    body_record.updated(graph.updates)
     for thing in (update.id for update in graph.updates):
         if isinstance(thing, bpy.types.Mesh):
             session.read.weights.pop(thing.name_full, None)

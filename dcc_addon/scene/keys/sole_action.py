@@ -7,7 +7,7 @@ import json
 
 import bpy
 
-from ..objects.remembered import are_numbers, remembered
+from ..objects.stored_values import are_numbers, remembered
 
 AS_ALONE = {"action_influence": 1.0, "action_extrapolation": "HOLD", "action_blend_type": "REPLACE"}
 """The settings with which it plays beside strips as it does alone."""
