@@ -177,7 +177,7 @@ def test_a_groom_alone_is_told_to_be_put_on_its_character(tmp_path, model):
     stage.Save()
     for missing, remedy in (
         (None, "if it holds hair alone, sublayer or reference it"),
-        ("lost.usda", "add the files that it"),
+        ("lost.usda", "add or repair the files that it"),
     ):
         if missing:
             Sdf.Layer.FindOrOpen(str(shot)).subLayerPaths.append(missing)
@@ -204,16 +204,20 @@ def test_a_rig_without_a_head_can_be_helped_by_hand(tmp_path, model):
     assert bake(path, tmp_path / "out.usdc", model, head="bone3").grooms[0]["joint"].endswith("bone3")
 
 
+@pytest.mark.parametrize("damaged", [False, True])
 @pytest.mark.parametrize(
     "made_of", ["(\n    subLayers = [@./groom.usda@]\n)", 'def "Hero" (\n    references = @./groom.usda@\n)\n{\n}']
 )
-def test_a_shot_that_came_without_its_layers_is_told_so(tmp_path, model, made_of):
-    """For a shot copied away from its layers, the message must not be that it needs a groom."""
+def test_a_shot_that_came_without_its_layers_is_told_so(tmp_path, model, made_of, damaged):
+    """For a shot copied away from its layers, or with only a part of one, the message must not be that it needs a groom."""
+    if damaged:
+        (tmp_path / "groom.usda").write_text("#usda 1.0\ndef {")
     path = tmp_path / "shot.usda"
     path.write_text(f"#usda 1.0\n{made_of}\n")
     for work in (lambda: bake(path, tmp_path / "a.usdc", model), lambda: bake_rig(path, tmp_path / "b.usda")):
         with pytest.raises(
-            NeuralocksError, match=r"shot.usda: holds no .*parts of it are missing.*groom.usda"
+            NeuralocksError,
+            match=r"shot.usda: holds no .*parts of it are missing or damaged.*groom.usda.*; add or repair",
         ) as caught:
             work()
         assert "\n" not in str(caught.value)

@@ -35,7 +35,8 @@ def uncomposed(stage: Usd.Stage) -> str:
     """What USD could not compose, as the likely cause if a stage lacks something, and the remedy; '' if it could compose all."""
     errors = _composition_errors(stage)
     if missing := _without_file(errors):
-        return f"parts of it are missing ({_told(missing[0]).removesuffix('; skipping.')}); add the files that it refers to"
+        fact = _told(missing[0]).removesuffix("; skipping.")
+        return f"parts of it are missing or damaged ({fact}); add or repair the files that it refers to"
     return f"USD could not compose all of it ({_told(errors[0])}); repair that" if errors else ""
 
 
