@@ -199,7 +199,7 @@ def test_a_process_that_fails_says_why_and_leaves_ctrl_c_to_the_trainer(tmp_path
 
 UNGUARDED = """
 import sys, time
-from neuralocks_core.training.material.farm import RolloutFarm
+from neuralocks_core.training.data.farm import RolloutFarm
 from neuralocks_core.training.train import train_strands
 
 if __name__ != "__main__":
