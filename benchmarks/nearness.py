@@ -4,7 +4,7 @@
     python benchmarks/nearness.py [--style STYLE ...] [--variation N ...]
 
 Variations of the styles that no training had, each moved by the nearest specialist and by the model for all, in a turn, a jump and a bow,
-beside the solver. `deformation.suited.NEAR` is chosen by this.
+beside the solver. `deformation.model_choice.NEAR` is chosen by this.
 """
 
 from __future__ import annotations
