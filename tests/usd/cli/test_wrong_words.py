@@ -135,12 +135,12 @@ def test_a_plot_that_cannot_be_written_is_told_before_the_work(tmp_path, capsys)
     (tmp_path / "file").touch()
     assert status("evaluate", tmp_path / "none.usdc", "--plot", tmp_path / "file" / "tips.png") == 1
     assert "tips.png: there is a file, not a folder, on the way" in capsys.readouterr().err
-
-
-def test_a_folder_where_a_file_is_to_be_is_told_before_the_work(tmp_path, capsys):
     (tmp_path / "tips.png").mkdir()
     assert status("evaluate", tmp_path / "none.usdc", "--plot", tmp_path / "tips.png") == 1
     assert capsys.readouterr().err == f"error: {tmp_path / 'tips.png'}: is a folder; give a file name\n"
+
+
+def test_a_folder_where_a_file_is_to_be_is_told_before_the_work(tmp_path, capsys):
     (tmp_path / "model" / "rig.onnx").mkdir(parents=True)
     assert status("export", model_file.shipped("rig"), "-o", tmp_path / "model") == 1
     assert "rig.onnx: is a folder; move it" in capsys.readouterr().err
