@@ -23,6 +23,7 @@ from .scene.files.appended import remake
 from .scene.files.overrides import make_comparable
 from .scene.files.save_as import Remade
 from .scene.hair import blur
+from .scene.motion.after_undo import note_actions
 from .scene.motion.up_to_date import ensure
 from .scene.objects.live_objects import lively
 from .scene.objects.lookup import find
@@ -98,6 +99,12 @@ def on_load(*_):
     for scene in bpy.data.scenes:
         if view.needs_sampling(scene):
             background.request()
+
+
+@persistent
+def before_undo(*_):
+    """All will be reported as edited: note what is."""
+    note_actions()
 
 
 @persistent
@@ -203,7 +210,9 @@ HANDLERS = {
     "depsgraph_update_pre": before_update,
     "depsgraph_update_post": on_update,
     "load_post": on_load,
+    "undo_pre": before_undo,
     "undo_post": on_undo,
+    "redo_pre": before_undo,
     "redo_post": on_undo,
     "save_pre": before_save,
     "save_post": after_save,

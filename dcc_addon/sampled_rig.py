@@ -50,8 +50,6 @@ class SampledRig:
     """The unkeyed pose; see `scene.motion.dependencies.posture_of`."""
     unreported: dict[str, int]
     """Numbers of what Blender may not report of the bodies, by name; see `scene.motion.rigging.unreported`."""
-    actions: dict[str, int]
-    """Numbers of the actions that moved it, by name; see `scene.motion.after_undo`."""
     moved_by: frozenset[str]
     """Names of the objects that moved it; see `scene.motion.dependencies.moved_by`."""
     carriers: dict[str, int]
@@ -66,6 +64,8 @@ class SampledRig:
     """Notes on frames at which the character jumps; see `services.rigs.leaps`."""
     hairs_off: dict[str, str]
     """Notes on hair objects, by name, that do not move with the head; see `scene.character.riding`."""
+    actions: dict[str, int] | None = None
+    """Numbers of the actions that moved it, by name, once an undo has asked for them; see `scene.motion.after_undo`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:

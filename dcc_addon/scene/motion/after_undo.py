@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the actions and bodies of a sampling are as they were: after an undo, Blender reports everything as edited."""
+"""Whether the actions and bodies of a sampling are as they were: after an undo, Blender reports everything as edited. Keys are first
+read when an undo is about to happen: of the shipped shot, that takes a fifth as long as sampling it.
+"""
 
 import zlib
 
@@ -24,7 +26,16 @@ CHOICES = ("interpolation", "easing")
 """What keys of a curve are made of; numbers, and one of several."""
 
 
-def numbers_of(moved_by: frozenset[str]) -> dict[str, int]:
+def note_actions() -> None:
+    """Before an undo: note the actions of motions that are up to date, so that these are still as they were sampled. Blender has told of
+    all edits by then: it evaluates them before it calls an operator.
+    """
+    for sampled in session.rigs.values():
+        if sampled.actions is None and not sampled.stale:
+            sampled.actions = _numbers_of(sampled.moved_by)
+
+
+def _numbers_of(moved_by: frozenset[str]) -> dict[str, int]:
     """A number of each action, by name, of which the keys may change the motion of a rig that objects of these names move; none if
     these have too many keys.
     """
@@ -36,7 +47,7 @@ def numbers_of(moved_by: frozenset[str]) -> dict[str, int]:
 
 def as_sampled(name: str, sampled: SampledRig, actions, bodies: bool) -> bool:
     """Whether these actions, and if asked the bodies, are as they were when the armature of this name was sampled."""
-    known = sampled.actions
+    known = sampled.actions or {}
     if any(action.name_full not in known for action in actions):
         return False
     if any(known[action.name_full] != _number_of(action) for action in actions):

@@ -31,7 +31,6 @@ from ..drawing.clock import rate_of, shown_frame
 from ..drawing.hidden_objects import watched
 from ..objects.lookup import find, named
 from ..objects.relations import found_anew
-from .after_undo import numbers_of
 from .dependencies import frames_of, key_of, moved_by, posture_of, rigging_of
 from .rigging import unreported
 from .stepping import step, stepping
@@ -102,7 +101,6 @@ class _Recording:
             "unreported": {body.name_full: unreported(body) for body in bodies},
             "moved_by": moved_by(armature, scene),
         }
-        self._depends["actions"] = numbers_of(self._depends["moved_by"])
         self._edits = session.edits
         self.frames = frame_numbers(*frames_of(scene), scene.neuralocks.subframes)
         self._rate = rate_of(scene)

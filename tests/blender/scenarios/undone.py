@@ -50,6 +50,21 @@ def undone_beside(_folder: Path) -> None:
             assert _sampled() is first and not first.stale, (change, step)
 
 
+def undone_after_unseen_edit(_folder: Path) -> None:
+    """A script's edit of a key that Blender has not evaluated before an undo of something else puts the motion out of date."""
+    rig, _ = scenes.dancer_with_shapes()
+    _begin(rig)
+    assert not _sampled().stale
+    action = bpy.data.objects["Rig"].animation_data.action
+    scenes.fcurves(bpy.data.objects["Rig"])[0].keyframe_points[1].co[1] += 0.2
+    action.update_tag()
+    bpy.ops.ed.undo_push(message="edited")
+    bpy.data.objects["Prop"].scale = 1, 2, 3
+    bpy.ops.ed.undo_push(message="beside")
+    bpy.ops.ed.undo()
+    assert _sampled().stale
+
+
 def undone_edit(_folder: Path) -> None:
     """An undo of an edit of keys or of the body puts a motion that was sampled since out of date, whatever the edit was."""
     rig, _ = scenes.dancer_with_shapes()
