@@ -2,6 +2,7 @@
 """What the header's history feels of gravity and wind: in the head's axes, wherever they point."""
 
 import numpy as np
+import pytest
 
 from neuralocks_core.rig import rig_spec
 from neuralocks_core.rig.export_c import export_c
@@ -82,3 +83,19 @@ def test_a_gale_is_felt_at_once_and_no_more_than_six_g_of_it(tmp_path):
         wanted = np.broadcast_to(np.outer(spec.bin_weights, wind), felt[:, :, :3].shape)
         np.testing.assert_allclose(felt[:, :, :3], wanted, atol=1e-4)
         assert not felt[:, :, 3:].any()
+
+
+@pytest.mark.parametrize(("spin", "rate"), [(12, 60), (12, 240), (40, 240), (70, 60)])
+def test_a_blow_is_felt_in_the_axes_of_a_step_later(tmp_path, spin, rate):
+    """Where nothing pulls, a head that spins about a slanted axis begins to move: it counts as turning on by a step of the model's, no
+    faster than 25 rad/s, however long the frames are.
+    """
+    spec, axis, speed = rig_spec(True), np.array([2, -1, 2]) / 3, np.array([0.9, 0.4, -0.2])
+    export_c(random_model((2,), 8, spec=spec), tmp_path / "hair.h")
+    t = np.arange(round(1.3 * rate)) / rate
+    heads = to_quaternion(from_vector(np.outer(spin * t, axis)))
+    rows = np.hstack([t[:, None], np.outer(np.maximum(0, t - 1), speed), heads, np.zeros((len(t), 3))])
+    felt = run_c(compiled(tmp_path, WALL_HARNESS), rows, 6 * len(spec.bins))[-1].reshape(-1, 6)[:, :3]
+    whole = spec.dt * (np.divide(spec.bins, spec.bin_weights)[:, None] * felt).sum(axis=0)
+    later = from_vector(axis * spin) @ from_vector(axis * 2 * np.arctan(0.5 * spec.dt * min(spin, 25)))
+    np.testing.assert_allclose(whole, -later.T @ speed / 9.81, atol=1e-4)
