@@ -21,7 +21,7 @@ from neuralocks_core.hairstyles.fitting import Fitted, fit
 from neuralocks_core.progress import Progress, silent, within
 
 from ..border.stage_files import check_layer_name, check_not_input, check_not_over
-from ..shot.notes.shot_notes import first_of, unlikely_head
+from ..shot.notes.skeleton_notes import first_of, unlikely_head
 from ..shot.stage import read_rigs
 from ..shot.strands.curves import find_curves
 from ..skel.stage_rig import StageRig

@@ -15,13 +15,14 @@ from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import check_not_input, open_stage
 from ..border.stopping import check
+from ..border.told_once import few
 from ..border.units import Border
 from ..shot.carriers.attach import Attachment
 from ..shot.carriers.twin_bodies import one_person
 from ..shot.characters.skeletons import read_each_rig
 from ..shot.notes.groom_notes import groom_notes, no_points
 from ..shot.notes.missing import no_groom
-from ..shot.notes.shot_notes import composition_notes, few, unit_notes
+from ..shot.notes.stage_notes import composition_notes, unit_notes
 from ..shot.search.hair_search import HairSearch
 from ..shot.search.other_curves import of_other_kinds
 from ..shot.search.rig_controls import open_curves

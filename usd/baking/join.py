@@ -16,11 +16,12 @@ from neuralocks_core.progress import Progress, silent
 
 from ..border.damage import first_line, named
 from ..border.stage_files import LAYERS, check_file, check_layer_name, check_not_over, one_file, open_stage
+from ..border.told_once import few
 from ..border.units import Border
 from ..shot.bakes.bake_record import KEY
 from ..shot.bakes.gaps import gaps, some, thinned
 from ..shot.made_from import INPUTS, unlike
-from ..shot.notes.shot_notes import composition_notes, few, out_of_place
+from ..shot.notes.stage_notes import composition_notes, out_of_place
 from ..skel.rig_copy import SOURCE
 from .layer.header import relative, repeat_metadata
 from .layer.override import deliver

@@ -10,7 +10,6 @@ from neuralocks_core.models.runtime import StrandModel
 
 from ..shot.carriers.attach import Attachment
 from ..shot.notes.character_notes import untrained
-from ..shot.notes.shot_notes import without_strength
 
 
 def model_notes(
@@ -29,6 +28,13 @@ def learned(model: StrandModel, moved: Iterable[Attachment]) -> list[str]:
     found = [each for each in carriers.values() if not each.off_head]
     known = [each for each in found if model.knows(each.character, each.rig.clip)]
     return [note for each in known for note in untrained(each.carrying)]
+
+
+def without_strength(strength: float, dynamic: bool) -> list[str]:
+    """The note on a motion strength that a model of held poses does not feel."""
+    if strength == 1 or dynamic:
+        return []
+    return ["motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model"]
 
 
 def _unheard(model: StrandModel, material: Material) -> list[str]:

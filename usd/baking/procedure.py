@@ -11,9 +11,11 @@ from neuralocks_core.progress import Progress, silent
 from neuralocks_core.wind import Wind
 
 from ..border.time_codes import given_cuts, time_codes
+from ..border.told_once import few
 from ..shot.bakes.also_changed import also_changed
 from ..shot.bakes.gaps import hidden
-from ..shot.notes.shot_notes import asked_notes, few, out_of_place
+from ..shot.notes.range_notes import asked_notes
+from ..shot.notes.stage_notes import out_of_place
 from ..shot.stage import Shot, check_frames_named, read_shot
 from ..shot.strands.curves import find_curves
 

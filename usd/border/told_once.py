@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes that are the same for many prims, such as the characters of a crowd, told once."""
+"""Notes that are the same, or similar, for many prims, such as the characters of a crowd: told once, or a few of them."""
 
 import re
 from collections.abc import Hashable, Iterable
 
 _PATH = re.compile(r"(?<![\w.])/[\w/:.{}=-]*\w")
-_FEW = 2
-"""Up to this many similar texts stay separate."""
+_SEPARATE = 2
+"""Up to this many texts that differ only in prim paths stay separate."""
+_FEW = 3
+"""Up to this many similar lines are told one by one."""
 _NAMED = 8
 """Up to this many prims are named."""
 
@@ -30,7 +32,7 @@ def told_once(texts: Iterable[str]) -> list[str]:
     """
     result = []
     for same in grouped(dict.fromkeys(texts), without_paths):
-        if len(same) <= _FEW:
+        if len(same) <= _SEPARATE:
             result += same
             continue
         # At the first position where they differ: before it there may be a file that all of them name.
@@ -40,3 +42,8 @@ def told_once(texts: Iterable[str]) -> list[str]:
             others[_NAMED - 2 : -1] = ["..."]
         result.append(f"{same[0]} (likewise {len(same) - 1} more: {', '.join(others)})")
     return result
+
+
+def few(lines: list[str], others: str = "prims are left out like that") -> list[str]:
+    """The first of many similar lines about prims, and how many more there are: a set may have hundreds."""
+    return lines if len(lines) <= _FEW + 1 else [*lines[:_FEW], f"{len(lines) - _FEW} more {others}"]

@@ -23,7 +23,7 @@ from ..border.values import as_names
 from ..shot.characters.skeletons import read_each_rig
 from ..shot.notes.missing import nothing_found
 from ..shot.notes.motion_notes import motion_notes
-from ..shot.notes.shot_notes import without_turn
+from ..shot.notes.skeleton_notes import without_turn
 from ..skel.source import find_skeletons
 from ..skel.stage_rig import StageRig
 

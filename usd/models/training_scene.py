@@ -21,10 +21,11 @@ from ..assets.grow import Barber
 from ..border.damage import names_damage
 from ..border.placement import Placement
 from ..border.stage_files import check_file, open_stage
+from ..border.told_once import few
 from ..shot.carriers.attach import attach, of_another
 from ..shot.carriers.twin_bodies import one_person
 from ..shot.characters.skeletons import read_each_rig
-from ..shot.notes.shot_notes import few, first_of, unfound, unlikely_head
+from ..shot.notes.skeleton_notes import first_of, unfound, unlikely_head
 from ..shot.search.rig_controls import open_curves
 from ..shot.stage import read_rigs
 from ..shot.strands.curve_ends import groom_between

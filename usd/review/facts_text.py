@@ -7,6 +7,8 @@ from ..border.told_once import grouped, told_once, without_paths
 
 LONG = {"curve": "points", "hair": "strands"}
 """Lists of a model's card with up to thousands of items -> what these are."""
+ENDS = ("frames", "vertices per strand")
+"""Facts that are the least and the greatest, or both in one."""
 
 
 def as_text(facts: dict, indent: int = 0) -> str:
@@ -29,10 +31,8 @@ def as_text(facts: dict, indent: int = 0) -> str:
             lines += [f"{pad}{name}:", as_text(value, indent + 1)]
         elif isinstance(value, list) and value and all(isinstance(entry, dict) and entry for entry in value):
             lines += _each(name, value, indent)
-        elif name == "joint names" and isinstance(value, list) and all(isinstance(joint, str) for joint in value):
-            lines.append(f"{pad}{name}: {', '.join(map(leaf, value))}")
         else:
-            lines.append(f"{pad}{name}: {_short(value)}")
+            lines.append(f"{pad}{name}: {_short(name, value)}")
     if indent == 0:
         lines += [f"would stop a bake: {line}" for line in told_once(facts.get("stops", []))]
         lines += [f"note: {line}" for line in told_once(facts.get("spoils", []))]
@@ -45,7 +45,7 @@ def _each(name: str, entries: list[dict], indent: int) -> list[str]:
     if len(entries[0]) <= 3:
         lines = [f"{pad}{name}:"]
         for (_, first), *others in (entry.items() for entry in entries):
-            lines.append(f"{pad}  {first}: {', '.join(f'{k} {v}' for k, v in others)}")
+            lines.append(f"{pad}  {first}: {', '.join(f'{k} {_short(k, v)}' for k, v in others)}")
         return lines
     lines = []
     for entry, *same in grouped(entries, lambda entry: without_paths(repr(entry))):
@@ -67,11 +67,18 @@ def _is_number(value) -> bool:
     return isinstance(value, float) or isinstance(value, int) and abs(value) < 1e300
 
 
-def _short(value) -> str:
-    """A value, or a list of values, in a line."""
+def _short(name: str, value) -> str:
+    """A fact's value, or list of values, in a line."""
     if isinstance(value, list):
-        return ", ".join(map(str, value)) or "none"
-    return "none" if value is None or value == {} else f"{value:g}" if isinstance(value, float) else f"{value}"
+        if name in ENDS:
+            return " to ".join(map(_of_one, value))
+        own = name == "joint names" and all(isinstance(joint, str) for joint in value)
+        return ", ".join(map(leaf if own else str, value)) or "none"
+    return "none" if value is None or value == {} else _of_one(value)
+
+
+def _of_one(value) -> str:
+    return f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
 def _trainings(card) -> int:

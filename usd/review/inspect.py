@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a file holds, and what would stop or spoil a bake of it."""
 
+from contextlib import suppress
 from pathlib import Path
+
+from pxr import Usd, UsdSkel
 
 from neuralocks_core.anatomy.humanoid import NoHead
 from neuralocks_core.boundary.spec import POSE_JOINTS
@@ -14,7 +17,9 @@ from neuralocks_core.rig.rigging import assemble_rig
 
 from ..border.damage import names_damage
 from ..border.stage_files import OTHERS, USD, open_stage
+from ..border.told_once import few
 from ..border.units import Border
+from ..border.values import as_names
 from ..rig.facing import askew_notes
 from ..rig.notes import RIG_JOINTS, mirrored_notes, offset_notes
 from ..rig.stage import check_authored, check_orients, core_meshes, describe_chains, is_baked, of_bake
@@ -26,18 +31,9 @@ from ..shot.characters.whole_body import WholeBodies
 from ..shot.notes.character_notes import lies_down, untrained, weight_notes, without_body
 from ..shot.notes.missing import no_groom, no_skeleton
 from ..shot.notes.motion_notes import motion_notes
-from ..shot.notes.shot_notes import (
-    another_head,
-    composition_notes,
-    few,
-    layer_notes,
-    left_out,
-    not_animated,
-    out_of_range,
-    partial_body,
-    rig_notes,
-    without_turn,
-)
+from ..shot.notes.range_notes import out_of_range
+from ..shot.notes.skeleton_notes import another_head, left_out, not_animated, partial_body, rig_notes, without_turn
+from ..shot.notes.stage_notes import composition_notes, layer_notes
 from ..shot.search.hair_search import HairSearch
 from ..shot.stage import frame_range
 from ..shot.strands.curves import find_curves
@@ -86,7 +82,8 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     border = Border.of(stage)
     spoils = composition_notes(stage, path) + layer_notes(stage, path)
     facts = {"unit [m]": border.metres_per_unit, "up axis": border.up_axis, "rate [1/s]": border.rate}
-    rigs, errors = read_each_rig(stage, find_skeletons(stage), border, head, all_shapes=True, joints=joints)
+    prims = find_skeletons(stage)
+    rigs, errors = read_each_rig(stage, prims, border, head, all_shapes=True, joints=joints)
     if rigs:
         spoils += few([left_out(error) for error in errors], "skeletons are left out")
     else:
@@ -118,7 +115,17 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     elif not curves:
         stops.append(str(no_groom(stage, Path(path.name))))
     lines = {"stops": list(dict.fromkeys(stops)), "spoils": list(dict.fromkeys(spoils))}
-    return facts | {"skeletons": skeletons, "grooms": grooms} | lines
+    unused = [_unused(prim) for prim in prims if str(prim.GetPath()) not in {rig.path for rig in rigs}]
+    left = {"skeletons left out": unused} if unused else {}
+    return facts | {"skeletons": skeletons, **left, "grooms": grooms} | lines
+
+
+def _unused(prim: Usd.Prim) -> dict:
+    """What can be told of a skeleton that cannot be used: among its joints may be the head that the user is asked for."""
+    joints, names = UsdSkel.Skeleton(prim).GetJointsAttr(), ()
+    with suppress(NeuralocksError):  # then this is why it cannot be used
+        names = as_names(joints, joints.Get())
+    return {"path": str(prim.GetPath()), "joint names": list(names)}
 
 
 def _rig(rig: StageRig) -> dict:
@@ -135,7 +142,7 @@ def _rig(rig: StageRig) -> dict:
         "moved by a rig bake": is_baked(rig),
         "samples": len(rig.joints.keys.every),
         "head": found.get("head"),
-        "head found by": humanoid.reasons.get("head"),
+        "head found": humanoid.reasons.get("head"),
         "head width [m]": None if width is None else round(width, 3),
         "head height over ground [m]": _height(rig),
         "meshes": [str(m.prim.GetPath()) for m in rig.meshes],

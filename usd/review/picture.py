@@ -19,10 +19,10 @@ from ..border.damage import names_damage
 from ..border.stage_files import open_stage
 from ..border.stopping import deferred
 from ..border.time_codes import parse_frames, time_codes
+from ..border.told_once import few
 from ..border.units import Border
 from ..rig.picture import rigged_scene
 from ..rig.stage import read_rigged_hair
-from ..shot.notes.shot_notes import few
 from ..shot.strands.curves import find_curves
 from .baked import MOST_BODY_POINTS, Baked, NotBaked, read_baked
 from .unbaked import as_groomed

@@ -15,13 +15,16 @@ from neuralocks_core.progress import Progress
 from neuralocks_core.rig.network import RigModel
 from neuralocks_core.wind import check_felt
 
+from ..baking.model_notes import without_strength
 from ..border.amounts import check_number
 from ..border.damage import names_damage
 from ..border.stage_files import check_layer_name, check_not_over
 from ..border.stopping import check
 from ..border.time_codes import given_cuts
 from ..shot.bakes.also_changed import also_changed
-from ..shot.notes.shot_notes import asked_notes, left_out, out_of_place, without_strength
+from ..shot.notes.range_notes import asked_notes
+from ..shot.notes.skeleton_notes import left_out
+from ..shot.notes.stage_notes import out_of_place
 from ..shot.stage import check_cuts
 from ..shot.wind import as_wind, in_core, wind_facts
 from ..skel.source import find_skeletons

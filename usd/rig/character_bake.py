@@ -15,7 +15,7 @@ from neuralocks_core.wind import Wind
 
 from ..border.time_codes import time_codes
 from ..shot.notes.character_notes import lies_down
-from ..shot.notes.shot_notes import not_animated, on_twos, without_turn
+from ..shot.notes.skeleton_notes import not_animated, on_twos, without_turn
 from ..shot.stage import check_frames_named, frame_range
 from ..skel.clip_codes import SAME
 from ..skel.old_copy import outdated_note

@@ -22,7 +22,7 @@ from neuralocks_core.rig.rigging import moving_joints
 from neuralocks_core.skinned_body import LEAST_WEIGHT
 
 from ..border.damage import names_damage
-from ..shot.notes.shot_notes import few
+from ..border.told_once import few
 from ..shot.wind import recorded_wind
 from .notes import chain_notes, rigged_notes
 from .stage import RiggedHair, check_patterns, core_meshes, read_rigged_hair

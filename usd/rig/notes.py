@@ -9,7 +9,7 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.network import rig_spec
 
 from ..shot.notes.character_notes import lies_down, weight_notes
-from ..shot.notes.shot_notes import another_head, unfound, unlikely_head
+from ..shot.notes.skeleton_notes import another_head, unfound, unlikely_head
 from ..skel.stage_rig import StageRig
 from .facing import askew_notes
 from .stage import RiggedHair, core_meshes

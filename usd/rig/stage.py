@@ -29,7 +29,7 @@ from ..border.values import as_names
 from ..shot.characters.others import Others
 from ..shot.characters.whole_body import parts_elsewhere, with_parts
 from ..shot.notes.missing import has_hair_joints, nothing_found
-from ..shot.notes.shot_notes import partial_body
+from ..shot.notes.skeleton_notes import partial_body
 from ..skel.source import find_skeletons, read_rig
 from ..skel.stage_rig import StageRig
 from ..skel.surface import find_skins

@@ -9,7 +9,7 @@ from neuralocks_core.rig.chains import HairChains
 from neuralocks_core.rig.hair_names import says_face, says_hair_alone
 from neuralocks_core.skinned_body import LEAST_WEIGHT, Body
 
-from ..shot.notes.shot_notes import heads_above
+from ..shot.notes.skeleton_notes import heads_above
 from ..skel.stage_rig import StageRig
 
 

@@ -16,6 +16,7 @@ from ..border.placement import Placement
 from ..border.prim_paths import prim_path
 from ..border.stage_files import open_stage
 from ..border.time_codes import NEAR, given_cuts
+from ..border.told_once import few
 from ..border.units import Border
 from ..skel.cut_samples import within
 from ..skel.source import find_skeletons
@@ -27,16 +28,8 @@ from .characters.whole_body import WholeBodies, whole_body
 from .notes.character_notes import lies_down, untrained, weight_notes, without_body
 from .notes.groom_notes import groom_notes, stands_still
 from .notes.missing import no_groom, no_skeleton
-from .notes.shot_notes import (
-    composition_notes,
-    few,
-    layer_notes,
-    left_out,
-    not_animated,
-    partial_body,
-    rig_notes,
-    without_turn,
-)
+from .notes.skeleton_notes import left_out, not_animated, partial_body, rig_notes, without_turn
+from .notes.stage_notes import composition_notes, layer_notes
 from .search.hair_search import HairSearch
 from .strands.curve_ends import Beyond, groom_between
 from .strands.curves import find_curves

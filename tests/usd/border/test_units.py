@@ -7,7 +7,7 @@ import pytest
 from pxr import Usd
 
 from usd.border.units import Border
-from usd.shot.notes.shot_notes import layer_notes
+from usd.shot.notes.stage_notes import layer_notes
 
 
 @pytest.mark.parametrize(

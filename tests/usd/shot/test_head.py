@@ -9,6 +9,7 @@ from neuralocks_core.errors import NeuralocksError
 from usd.baking.bake import bake
 from usd.review.baked import read_baked
 from usd.review.evaluate import evaluate
+from usd.review.facts_text import as_text
 from usd.review.inspect import inspect
 from usd.shot.stage import read_shot
 
@@ -42,7 +43,7 @@ def test_a_binding_tells_the_head_where_no_name_does(tmp_path, bound):
     assert found.attachment.character.humanoid.joints == named.attachment.character.humanoid.joints
     assert np.array_equal(found.groom.points, named.groom.points)
     (skeleton,) = inspect(path)["skeletons"]
-    assert skeleton["head"] == found.joint and "by the binding of /Hero/" in skeleton["head found by"]
+    assert skeleton["head"] == found.joint and "by the binding of /Hero/" in skeleton["head found"]
     stage = Usd.Stage.Open(str(path))
     Sdf.CopySpec(stage.GetRootLayer(), "/Hero/Hair", stage.GetRootLayer(), "/Hero/Ruff")
     ruff = UsdSkel.BindingAPI.Apply(stage.GetPrimAtPath("/Hero/Ruff"))
@@ -118,3 +119,26 @@ def test_a_bake_tells_the_head_where_another_joint_is_named_like_one(tmp_path):
     named = read_baked(tmp_path / "bake.usda", head="hips/spine/neck/head")
     assert named.shot.grooms[0].joint == "hips/spine/neck/head", "what the user says now wins"
     assert evaluate(tmp_path / "bake.usda").to_json() == evaluate(tmp_path / "bake.usda", head="neck").to_json()
+
+
+def test_a_broken_binding_that_would_tell_the_head_is_named_first(tmp_path):
+    path = _without_a_head_by_name(write_shot(tmp_path, Recipe()))
+    stage = Usd.Stage.Open(str(path))
+    UsdSkel.BindingAPI(stage.GetPrimAtPath("/Hero/Hair")).GetJointIndicesPrimvar().GetAttr().Set([99])
+    stage.GetRootLayer().Save()
+    with pytest.raises(NeuralocksError, match="^/Hero/Hair: a joint index lies outside 0..7"):
+        read_shot(path)
+
+
+def test_joints_are_listed_where_the_user_is_asked_for_the_head(tmp_path):
+    path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound="none")))
+    text = as_text(inspect(path))
+    assert "/Hero/Rig: no joint is named like a head; name it with --head JOINT" in text
+    assert "  /Hero/Rig: joint names hips, spine, Hals, Kopf, arm_L" in text
+    assert "skeletons left out" not in inspect(path, head="Kopf")
+    stage = Usd.Stage.Open(str(path))
+    stage.GetPrimAtPath("/Hero/Rig").RemoveProperty("joints")
+    rig = stage.GetRootLayer().GetPrimAtPath("/Hero/Rig")
+    Sdf.AttributeSpec(rig, "joints", Sdf.ValueTypeNames.IntArray).default = [1]
+    stage.GetRootLayer().Save()
+    assert "its joints are int[], not token[]" in as_text(inspect(path))

@@ -9,7 +9,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from usd.baking.bake import bake
 from usd.review.inspect import inspect
-from usd.shot.notes.shot_notes import partial_body
+from usd.shot.notes.skeleton_notes import partial_body
 from usd.shot.stage import read_shot
 
 from ..shots import HAIR, Recipe, world_points, write_shot

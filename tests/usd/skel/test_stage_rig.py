@@ -12,7 +12,7 @@ from neuralocks_core.models.runtime import StrandModel
 from neuralocks_core.motion import Clip
 from neuralocks_core.rotation import from_vector
 from usd.border.time_codes import time_codes
-from usd.shot.notes.shot_notes import out_of_range
+from usd.shot.notes.range_notes import out_of_range
 from usd.shot.stage import read_rigs, read_shot
 from usd.skel.source import find_skeletons
 
@@ -154,3 +154,21 @@ def test_a_skeleton_is_chosen_by_path_or_by_a_name_of_its_own(tmp_path):
         find_skeletons(stage, "Neck")
     stage.RemovePrim("/A")
     assert [str(p.GetPath()) for p in find_skeletons(stage, "Rig")] == ["/B/Rig"]
+
+
+def test_an_animation_within_one_frame_is_told(tmp_path):
+    """Seconds of samples, one a time code, in a stage that says that 4800 of these are a second."""
+    for rate, frames, told in ((4800, 60, True), (4800, 5, False), (24, 60, False)):
+        stage = Usd.Stage.Open(str(write_shot(tmp_path, Recipe(frames=frames), f"at_{rate}_{frames}")))
+        stage.SetTimeCodesPerSecond(rate)
+        stage.GetRootLayer().Save()
+        rig = read_rigs(stage.GetRootLayer().realPath)[0]
+        notes = out_of_range(rig, 1, frames)
+        assert notes == (
+            [
+                "/Hero/Rig: all 60 samples of its animation lie within one frame, which is 200 time codes; check the "
+                "stage's timeCodesPerSecond and framesPerSecond"
+            ]
+            if told
+            else []
+        )

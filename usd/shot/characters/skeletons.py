@@ -10,6 +10,7 @@ from neuralocks_core.errors import NeuralocksError
 
 from ...border.placement import Placement
 from ...border.units import Border
+from ...skel.binding import bound_skeleton
 from ...skel.source import read_rig
 from ...skel.stage_rig import StageRig
 from ...skel.surface import find_skins
@@ -56,7 +57,12 @@ def read_each_rig(
 
 
 def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
-    """The joint that carries the groom of most points, and how that is known; None if nothing says so."""
+    """The joint that carries the groom of most points, and how that is known; None if nothing says so.
+
+    Raises:
+        NeuralocksError: nothing says so, but the binding of a groom that is bound to this skeleton would, were it not broken.
+    """
+    broken: list[NeuralocksError] = []
     curves = find_curves(rig.joints.prim.GetStage())
     empty = without_points(curves)
     for prim in sorted((p for p in curves if p not in empty), key=lambda prim: -len(rest_points(prim))):
@@ -65,10 +71,13 @@ def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
             return told, f"told by the bake of {prim.GetPath()}"
         try:
             found = bound_joint(prim, rig, Placement(prim), seated)
-        except NeuralocksError:  # reported when this groom is read
+        except NeuralocksError as error:  # of others, it is reported when this groom is read
+            broken += [error] if bound_skeleton(prim) == rig.path else []
             continue
         if found is not None:
             return found[0], f"by the binding of {found[1]}"
+    if broken:
+        raise broken[0]
     return None
 
 

@@ -22,7 +22,7 @@ from ...skel.stage_rig import StageRig
 from ...skel.surface import drawn
 from ..carriers.ways import beginnings
 from ..characters.whole_body import parts_elsewhere
-from .shot_notes import unlikely_head
+from .skeleton_notes import unlikely_head
 
 AROUND = 0.25
 """A mesh with some points this near to a head's joint [m] is the head's, or on it."""

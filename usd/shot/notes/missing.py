@@ -14,7 +14,7 @@ from neuralocks_core.rig.hair_names import says_hair, says_hair_alone
 from ...border.values import as_names
 from ...skel.source import find_skeletons
 from ..strands.curves import find_curves
-from .shot_notes import uncomposed
+from .stage_notes import uncomposed
 
 MOST_VARIANTS = 64
 """Variants that are tried: each composes the stage anew."""

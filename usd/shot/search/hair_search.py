@@ -10,6 +10,7 @@ from neuralocks_core.character import Character
 from neuralocks_core.errors import NeuralocksError
 
 from ...border.placement import Placement, Unplaced
+from ...border.told_once import few
 from ...skel.binding import bound_skeleton
 from ...skel.stage_rig import StageRig
 from ..bakes.bake_record import recorded_skeleton
@@ -19,7 +20,6 @@ from ..characters.others import Others
 from ..characters.unusable import Unusable, find_unusable, lies_on
 from ..notes.character_notes import unevenly_scaled
 from ..notes.groom_notes import another_binds, another_carries, far_from_named, no_points, too_far, unusable_skeleton
-from ..notes.shot_notes import few
 from ..strands.curve_ends import undrawn
 from ..strands.curves import left_as_they_are, without_points
 from .other_curves import drawn_as_copies, other_hair

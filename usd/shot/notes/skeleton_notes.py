@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes: what a user should know about a shot that can still be baked. One line each: prim or file, fact, remedy."""
+"""Notes on skeletons: which is taken, which joints are found in it, how they move, and what its body lacks."""
 
-import os
-from collections.abc import Iterable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
-from pxr import Pcp, Usd, UsdGeom
 
 from neuralocks_core.anatomy.joint_names import leaf
 from neuralocks_core.boundary.history import joints_read
@@ -16,99 +13,8 @@ from neuralocks_core.character import HEAD_WIDTHS, Character
 from neuralocks_core.rig.hair_names import says_hair
 from neuralocks_core.rotation import flat
 
-from ...border.damage import text_of
-from ...border.stage_files import unsaved
-from ...border.units import Border
+from ...border.told_once import few
 from ...skel.stage_rig import StageRig
-
-UNIT = UsdGeom.Tokens.metersPerUnit
-FEW = 3
-"""Up to this many similar lines are told one by one."""
-
-
-def composition_notes(stage: Usd.Stage, path: Path) -> list[str]:
-    """What USD could not compose: missing layers, for example."""
-    return [f"{path.name}: {_told(error)}" for error in _composition_errors(stage)]
-
-
-def uncomposed(stage: Usd.Stage) -> str:
-    """What USD could not compose, as the likely cause if a stage lacks something, and the remedy; '' if it could compose all."""
-    errors = _composition_errors(stage)
-    if missing := _without_file(errors):
-        fact = _told(missing[0]).removesuffix("; skipping.")
-        return f"parts of it are missing or damaged ({fact}); add or repair the files that it refers to"
-    return f"USD could not compose all of it ({_told(errors[0])}); repair that" if errors else ""
-
-
-def _told(error) -> str:
-    return " ".join(text_of(error).split())[:200]
-
-
-def _without_file(errors: list) -> list:
-    """Those of files that cannot be read; others, such as of cycles, may name the stage's first layer."""
-    kinds = Pcp.ErrorType_InvalidAssetPath, Pcp.ErrorType_InvalidSublayerPath
-    return [error for error in errors if error.errorType in kinds]
-
-
-def _composition_errors(stage: Usd.Stage) -> list:
-    """Empty if USD does not report them, as in Blender 4.2 (USD 24.05)."""
-    return stage.GetCompositionErrors() if hasattr(stage, "GetCompositionErrors") else []
-
-
-def layer_notes(stage: Usd.Stage, path: Path) -> list[str]:
-    """Notes if a sublayer has another unit or axis than the shot's first layer, the only one from which USD reads them; and if no
-    layer states the unit in effect, or how long a frame is.
-    """
-    border, layers = Border.of(stage), stage.GetLayerStack(includeSessionLayers=False)
-    notes = border.frame_notes(path.name)
-    for layer in layers[1:]:
-        if differs := border.differing(layer):
-            notes.append(
-                f"{path.name}: its layer {layer.GetDisplayName()} {differs}: the first layer's count; author them there"
-            )
-            break
-    return notes + unit_notes(stage, path)
-
-
-def unit_notes(stage: Usd.Stage, path: Path) -> list[str]:
-    """The note on a stage of which no layer states the unit in effect."""
-    unit, layers = Border.of(stage).metres_per_unit, stage.GetLayerStack(includeSessionLayers=False)
-    units = [layer.pseudoRoot.GetInfo(UNIT) for layer in stage.GetUsedLayers() if layer.pseudoRoot.HasInfo(UNIT)]
-    if unit in units or any(layer.pseudoRoot.HasInfo(UNIT) for layer in layers):
-        return []
-    return [f"{path.name}: no metersPerUnit, so a unit counts as a centimetre; author it"]
-
-
-def asked_notes(stage: Usd.Stage, rigs: Iterable[StageRig], codes: list[float], loop: bool) -> list[str]:
-    """The notes on what a bake was asked for.
-
-    Args:
-        stage: the shot.
-        rigs: skeletons that carry what is baked.
-        codes: the time codes, ascending.
-        loop: hair moves on outside of the animation, too, as `StageRig.loop_notes` tells.
-    """
-    return _edited(stage) + [text for rig in rigs if not loop for text in out_of_range(rig, codes[0], codes[-1])]
-
-
-def _edited(stage: Usd.Stage) -> list[str]:
-    """The notes on layers of a shot with unsaved changes, so that another program reads a different shot."""
-    names = sorted(layer.GetDisplayName() for layer in unsaved(stage) if layer.realPath)
-    return [f"{name}: has unsaved changes, which this bake has in it; save it" for name in names]
-
-
-def out_of_place(stage: Usd.Stage, out: Path) -> list[str]:
-    """The note on a layer over a shot that cannot find, from its own folder, all files that the shot finds from its folder."""
-    if os.path.realpath(out.parent) == os.path.dirname(os.path.realpath(stage.GetRootLayer().realPath)):
-        return []
-    found = {text_of(error) for error in _composition_errors(stage)}
-    told = [text_of(error) for error in _without_file(_composition_errors(Usd.Stage.Open(str(out))))]
-    lost = [text for text in told if text not in found]
-    return [
-        f"{out}: {' '.join(text.split())[:200].rstrip('.')}, which the shot finds from its own folder; write the bake there, or "
-        "have USD search that folder (PXR_AR_DEFAULT_SEARCH_PATH)"
-        for text in lost[:1]
-    ]
 
 
 def left_out(error) -> str:
@@ -124,11 +30,6 @@ def first_of(rigs: Sequence[StageRig]) -> list[str]:
         f"{rigs[0].path}: the first of {len(rigs)} skeletons is taken; choose another, such as {rigs[1].path}, with "
         "--skeleton PRIM"
     ]
-
-
-def few(lines: list[str], others: str = "prims are left out like that") -> list[str]:
-    """The first of many similar lines about prims, and how many more there are: a set may have hundreds."""
-    return lines if len(lines) <= FEW + 1 else [*lines[:FEW], f"{len(lines) - FEW} more {others}"]
 
 
 def not_animated(rig: StageRig) -> str:
@@ -269,33 +170,3 @@ def partial_body(rig: StageRig, left: Sequence[str]) -> list[str]:
         f"{rig.path}: {', '.join(few([*left], 'skeletons'))} {'is' if len(left) == 1 else 'are'} the same character, but no joint there moves like one "
         "of the same name here, so hair is not kept out of those meshes; bind all to one skeleton if hair touches them"
     ]
-
-
-def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
-    """The note on a range of time codes that the animation mostly does not cover, so that the character stands still."""
-    samples = rig.joints.keys.every
-    if len(samples) < 2:
-        return []
-    within = min(samples[-1], last) - max(samples[0], first)
-    if within >= 0.5 * (last - first) or _moves_on(rig, first, last):  # a shot may have handles
-        return []
-    much, held = ("none of it", "a held pose") if within < 0 else ("little of it", "elsewhere a held pose")
-    return [
-        f"{rig.path}: its animation lies at time codes {samples[0]:g} to {samples[-1]:g}, {much} within {first:g} to "
-        f"{last:g}: {held}; check --frames, the shot's range and the layer offsets"
-    ]
-
-
-def _moves_on(rig: StageRig, first: float, last: float) -> bool:
-    """Whether what places a character moves before its first key or after its last one: a spline may loop."""
-    keys, placed = rig.joints.keys.every, rig.joints.placement
-    codes = [code for code in np.linspace(first, last, 9) if not keys[0] <= code <= keys[-1]]
-    ends = np.clip(codes, keys[0], keys[-1])
-    return not all(np.allclose(placed.at(code), placed.at(end)) for code, end in zip(codes, ends))
-
-
-def without_strength(strength: float, dynamic: bool) -> list[str]:
-    """The note on a motion strength that a model of held poses does not feel."""
-    if strength == 1 or dynamic:
-        return []
-    return ["motion strength: has no effect on a model of held poses; leave it at 1, or give a dynamic model"]
