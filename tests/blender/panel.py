@@ -30,7 +30,7 @@ def drawn(icon: str = "") -> list[str]:
             cls.draw(SimpleNamespace(layout=layout), bpy.context)
         menu.draw(SimpleNamespace(layout=layout), bpy.context)
 
-    known_problem()  # asks a Python once; each drawing would, for it forgets the answer
+    known_problem()  # asks once; each drawing would, for it forgets the answer
     return shown(draw, icon)
 
 

@@ -19,9 +19,12 @@ def main() -> None:
     import bpy
 
     import dcc_addon
+    from dcc_addon.operators import training
+    from dcc_addon.services.training.trainers import Trainers
     from tests.blender import scenarios, scenes
 
     dcc_addon.register()
+    training._trainers = Trainers(lambda _python: "")  # a real answer takes seconds; `second_python` asks for one
     modules = scenarios.modules()
     print(f"Blender {bpy.app.version_string}", flush=True)
     for line in sys.stdin:

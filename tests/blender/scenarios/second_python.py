@@ -23,7 +23,7 @@ def remedy_followed(folder: Path) -> None:
         f"import os, sys\nos.path.exists({str(there)!r}) or sys.exit('it lacks torch')\nprint({training_job.CAN!r})"
     )
     python = shutil.which("python3") or sys.executable
-    kept = training_job.CHECK, operator.training_python, trainers.AGAIN
+    kept = training_job.CHECK, operator.training_python, trainers.AGAIN, operator._trainers
     training_job.CHECK, operator.training_python, trainers.AGAIN = check, lambda: python, 0.5
     operator._trainers = trainers.Trainers()
     try:
@@ -32,7 +32,7 @@ def remedy_followed(folder: Path) -> None:
         there.touch()
         assert not _told(lambda said: not said)
     finally:
-        training_job.CHECK, operator.training_python, trainers.AGAIN = kept
+        training_job.CHECK, operator.training_python, trainers.AGAIN, operator._trainers = kept
 
 
 def _told(until) -> str:

@@ -10,7 +10,6 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from dcc_addon.scene.hair import curves
-from dcc_addon.services.training.trainers import Trainers
 from dcc_addon.session import session
 from tests.blender import scenes
 from tests.blender.checks import MODEL, SAME, apart, baked_points, make_live, points_at, refused, told_by
@@ -32,10 +31,7 @@ def too_little_hair(folder: Path) -> None:
             for begin in (operators.bake, operators.bake_attach, operators.report_card):
                 hair.neuralocks_hair.armature = rig
                 refused(begin, hair.name, fact)
-        with (
-            patch("dcc_addon.operators.training.sampling", side_effect=AssertionError("it was sampled")),
-            patch("dcc_addon.operators.training._trainers", Trainers(lambda python: "")),
-        ):
+        with patch("dcc_addon.operators.training.sampling", side_effect=AssertionError("it was sampled")):
             refused(operators.train, hair.name, fact)
         assert not list(folder.glob("*.usdc")) and not hair.modifiers
         hair.neuralocks_hair.armature = None
