@@ -3,6 +3,8 @@
 
 import numpy as np
 
+from neuralocks_core.body.tree_search import search, surface_tree
+
 BALL = 0.004
 """A ball of this radius [m] cannot get into a hollow from outside: wider than open lips, narrower than an ear's folds."""
 CREASE = 0.0015
@@ -18,7 +20,6 @@ def filled(value: np.ndarray, cell: float) -> np.ndarray:
     Where no hollow is near, distances stay unchanged, except by a millimetre at a few nodes inside.
     """
     from scipy import ndimage
-    from scipy.spatial import cKDTree
 
     free = np.pad(value >= BALL, 1, constant_values=True)
     number = ndimage.label(free)[0]
@@ -35,7 +36,7 @@ def filled(value: np.ndarray, cell: float) -> np.ndarray:
     asked = asked[-depth < value[~outside]]  # the others stay as they are: the best ball is no farther than this one
     result = value.copy()
     if len(asked):
-        far, which = cKDTree(cell * nodes).query(cell * asked, k=np.arange(1, min(NEIGHBOURS, len(nodes)) + 1))
+        far, which = search(surface_tree(cell * nodes), cell * asked, np.arange(1, min(NEIGHBOURS, len(nodes)) + 1))
         depth = (far - value[rim][which]).min(axis=1) - CREASE
         result[tuple(asked.T)] = np.minimum(value[tuple(asked.T)], -depth)
     return result
