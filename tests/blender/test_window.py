@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel in a real window under a virtual screen: a script clicks the tab and Live, scrubs, bakes, takes a picture."""
+"""The panel in a real window under a virtual screen: a script clicks the tab, Live and Train, scrubs, bakes, takes a picture."""
 
 import contextlib
 import os
@@ -16,7 +16,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_panel_in_a_window(random_model, tmp_path):
-    """Live by a click of the mouse, hair that follows the time line, a bake from the panel, a picture."""
+    """Live and a training by clicks of the mouse, hair that follows the time line, a bake from the panel, a picture. What trains is a
+    stand-in that copies a model.
+    """
     for program in ("blender", "xvfb-run", "xdotool"):
         if not shutil.which(program):
             pytest.skip(f"{program} is not installed")

@@ -16,8 +16,8 @@ import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 
 FOLDER = Path(sys.argv[-1])
-TAB, LIVE = 130, 341
-"""How far below the top of the sidebar the third tab and the Live button are."""
+TAB, LIVE, TRAIN = 130, 341, 309
+"""How far below the top of the sidebar the third tab and the Live button are, and the Train button once the motion is sampled."""
 TICK, AGAIN, PATIENCE = 0.4, 12.0, 60.0
 """Seconds from step to step, until a click is repeated, and until what should hold must hold."""
 state = {"tick": TICK}
@@ -27,8 +27,10 @@ def build():
     """A moving character with hair that is not live yet."""
     import dcc_addon
     from tests.blender import scenes
+    from tests.blender.scenarios.training import stand_in
 
     dcc_addon.register()
+    stand_in(FOLDER)
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
     scene = bpy.context.scene
@@ -40,6 +42,7 @@ def build():
     scene.neuralocks.armature, scene.neuralocks.hair = rig, hair
     hair.neuralocks_hair.model = os.environ["NEURALOCKS_TEST_MODEL"]
     scene.frame_set(12)
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "window.blend"))
     for area in bpy.context.window_manager.windows[0].screen.areas:
         if area.type == "VIEW_3D":
             area.spaces.active.show_region_ui = True
@@ -68,17 +71,23 @@ def mouse(below=None, click=False):
     subprocess.run(["xdotool", "mousemove", str(x if below else 300), str(y)], check=True)
 
 
-def is_live():
-    """The click on Live has reached the hair, and sampling runs in the background. On a busy machine, the panel may not have been drawn
-    yet when it came: then the tab and the button are clicked again, with twice as much time between.
+def click_again(arrived: bool, clicks: list) -> bool:
+    """Whether these clicks are repeated, which have not arrived: on a busy machine, the panel may not have been drawn yet when they
+    came. There is twice as much time between them then.
     """
+    if arrived or time.monotonic() - state["since"] < AGAIN or state["tick"] > 3:
+        return False
+    state["tick"] *= 2
+    STEPS[1:1] = [*clicks, STEPS[0]]
+    return True
+
+
+def is_live():
+    """The click on Live has reached the hair, and sampling runs in the background."""
     live = bpy.data.objects["Hair"].neuralocks_hair.live
-    if not live and time.monotonic() - state["since"] > AGAIN and state["tick"] < 3:
-        state["tick"] *= 2
-        STEPS[1:1] = [*CLICKS, is_live]
-        return
-    assert live, "the click on Live has not arrived"
-    state["tick"] = TICK
+    if not click_again(live, TO_LIVE):
+        assert live, "the click on Live has not arrived"
+        state["tick"] = TICK
 
 
 def sampled():
@@ -124,6 +133,29 @@ def sampled_at(height: float):
     assert abs(first[2, 3] - height) < 1e-6 and session.sampling.done is None, first
 
 
+def in_training():
+    """The click on Train has begun a training, of which the panel knows how far it is; meanwhile, the time line can be scrubbed."""
+    from dcc_addon.operators.training import job
+
+    running = job()
+    if not click_again(running is not None, TO_TRAIN):
+        assert running is not None, "the click on Train has not arrived"
+        assert running.message == "half", running.message
+        state["tick"] = TICK
+        scrub()
+        (FOLDER / "go").touch()
+
+
+def trained():
+    """The hair moves by the model that came of it: a copy of its own."""
+    from dcc_addon.live.models import model_path
+    from dcc_addon.session import session
+
+    assert session.said.trained == ("Hair: trained", True), session.said.trained
+    assert model_path(bpy.data.objects["Hair"]) == str(FOLDER / "Hair_1.neuralocks")
+    scrub()
+
+
 def bake():
     """From the panel's operator, with progress."""
     window = bpy.context.window_manager.windows[0]
@@ -149,11 +181,12 @@ def _idle():
     """Time to draw."""
 
 
-CLICKS = [lambda: mouse(TAB), lambda: mouse(click=True), _idle, lambda: mouse(LIVE), lambda: mouse(click=True), _idle]
-STEPS = [build, _idle, mouse, lambda: mouse(click=True), _idle, *CLICKS, picture, is_live, sampled, scrub,
+TO_LIVE = [lambda: mouse(TAB), lambda: mouse(click=True), _idle, lambda: mouse(LIVE), lambda: mouse(click=True), _idle]
+TO_TRAIN = [lambda: mouse(TRAIN), lambda: mouse(click=True), _idle]
+STEPS = [build, _idle, mouse, lambda: mouse(click=True), _idle, *TO_LIVE, picture, is_live, sampled, scrub,
          lambda: draw_body(False), lambda: kept_out_of(), lambda: draw_body(True), lambda: kept_out_of("Body"),
          lambda: put_hair(0.02), lambda: sampled_at(0.02), lambda: put_hair(0.0), lambda: sampled_at(0.0),
-         bake, baked, picture]  # fmt: skip
+         *TO_TRAIN, in_training, trained, bake, baked, picture]  # fmt: skip
 
 
 def tick():

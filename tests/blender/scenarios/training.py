@@ -190,6 +190,20 @@ def trained_in_a_shot(folder: Path) -> None:
 
 def _in_training(folder: Path, notes=(), before: str = ""):
     """Hair of a saved file for which a training runs until `_ended` is called; it copies a model, and does something first."""
+    stand_in(folder, notes, before)
+    scenes.empty()
+    rig, strands = scenes.dancer(20, skinned=True)
+    bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
+    exported = folder / "exported"
+    exported.mkdir(exist_ok=True)
+    tempfile.tempdir = str(exported)
+    assert bpy.ops.neuralocks.train() == {"FINISHED"}
+    return strands
+
+
+def stand_in(folder: Path, notes=(), before: str = "") -> None:
+    """From now on, trainings are half done at once, and copy a model when there is a file `go` beside that; they do something first."""
     from dcc_addon.operators import training as operator
     from dcc_addon.services.training import training_job
 
@@ -210,15 +224,6 @@ def _in_training(folder: Path, notes=(), before: str = ""):
     check.write_text(f"print({training_job.CAN!r})")
     training_job.CHILD, training_job.CHECK = child, check
     operator.training_python = lambda: shutil.which("python3") or sys.executable
-    scenes.empty()
-    rig, strands = scenes.dancer(20, skinned=True)
-    bpy.context.scene.neuralocks.armature, bpy.context.scene.neuralocks.hair = rig, strands
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "train.blend"))
-    exported = folder / "exported"
-    exported.mkdir(exist_ok=True)
-    tempfile.tempdir = str(exported)
-    assert bpy.ops.neuralocks.train() == {"FINISHED"}
-    return strands
 
 
 def _ended() -> tuple[str, bool]:
