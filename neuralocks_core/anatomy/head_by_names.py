@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from neuralocks_core.anatomy.hierarchy import depth
+from neuralocks_core.anatomy.hierarchy import below, copies, depth
 from neuralocks_core.anatomy.joint_names import leaf
 
 _NOT_HEAD = ("end", "top", "nub", "gear", "fore", "band", "twist", "ctrl", "aim", "site")
@@ -19,7 +19,7 @@ def head_by_names(names, sides, keys, parents, positions=None, skinned=None) -> 
         sides, keys: of each joint (J), as `joint_names.sides_and_keys` gives them.
     """
     middle = [joint for joint, side in enumerate(sides) if not side]
-    head = _named(middle, keys, parents)
+    head = _named(middle, keys, parents, positions, skinned)
     if head is not None:
         return head, f"by name '{leaf(names[head])}'"
     neck = max(
@@ -35,14 +35,22 @@ def head_by_names(names, sides, keys, parents, positions=None, skinned=None) -> 
     return head, f"last joint of the spine '{leaf(names[head])}'"
 
 
-def _named(middle: list[int], keys, parents) -> int | None:
-    def rank(joint: int) -> tuple:
+def _named(middle: list[int], keys, parents, positions, skinned) -> int | None:
+    """Of joints that are named alike, one that moves skin, as it does if one below it does, or a copy of it; then the highest."""
+
+    def named(joint: int) -> tuple:
         key = keys[joint]
         # XNALara's `head neck lower` is a neck, its `head neck upper` the head.
-        return key != "head", not key.endswith("head"), "lower" in key, depth(joint, parents), joint
+        return key != "head", not key.endswith("head"), "lower" in key
 
-    heads = (joint for joint in middle if "head" in keys[joint] and not _excluded(keys[joint].replace("head", "")))
-    return min(heads, key=rank, default=None)
+    def still(joint: int) -> bool:
+        same = (joint, *copies(joint, parents, positions))
+        return skinned is not None and not any(np.asarray(skinned)[below(each, parents)].any() for each in same)
+
+    heads = [joint for joint in middle if "head" in keys[joint] and not _excluded(keys[joint].replace("head", ""))]
+    best = min(map(named, heads), default=None)
+    alike = (joint for joint in heads if named(joint) == best)
+    return min(alike, key=lambda joint: (still(joint), depth(joint, parents), joint), default=None)
 
 
 def _on_neck(neck: int, sides, keys, parents, positions) -> int | None:

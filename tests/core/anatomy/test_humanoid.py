@@ -156,6 +156,17 @@ def test_the_head_of_a_control_rig_is_the_copy_that_moves_the_skin(by_hand):
     )
 
 
+@pytest.mark.parametrize("carries_skin", ["head", "face"])
+def test_a_control_named_like_the_head_but_elsewhere_is_not_the_head(carries_skin):
+    """It is higher in the hierarchy, and moves no skin; the head may move it by the joints of its face alone."""
+    paths, parents = rig("root\n c_head\n hips\n  spine\n   neck\n    head\n     face")
+    leaves = [path.rpartition("/")[2] for path in paths]
+    places = np.array([(0.0, {"c_head": 2.1}.get(name, HEIGHTS.get(name, 0.9)), 0.0) for name in leaves])
+    skinned = np.array([name == carries_skin for name in leaves])
+    for known, head in ((skinned, "head"), (None, "c_head"), (np.zeros(len(paths), bool), "c_head")):
+        assert leaves[find_humanoid(paths, parents, places, {}, known)["head"]] == head
+
+
 def test_a_face_that_hangs_from_a_copy_of_the_head_is_on_the_head():
     paths, parents, places, skinned, leaves = control_rig()
     bind = np.tile(np.eye(4), (len(paths), 1, 1))
