@@ -31,7 +31,7 @@ from ..shot.characters.whole_body import WholeBodies
 from ..shot.notes.character_notes import lies_down, untrained, weight_notes, without_body
 from ..shot.notes.missing import no_groom, no_skeleton
 from ..shot.notes.motion_notes import motion_notes
-from ..shot.notes.range_notes import out_of_range
+from ..shot.notes.range_notes import out_of_range, without_range
 from ..shot.notes.skeleton_notes import another_head, left_out, not_animated, partial_body, rig_notes, without_turn
 from ..shot.notes.stage_notes import composition_notes, layer_notes
 from ..shot.search.hair_search import HairSearch
@@ -101,6 +101,7 @@ def _stage(path: Path, head: str | None, joints: dict[str, str] | None) -> dict:
     moving = [rig for rig in rigs if rig.joints.animated]
     if moving:
         facts["frames"] = list(frame_range(stage, moving))
+        spoils += without_range(stage)
         spoils += [text for rig in moving for text in out_of_range(rig, *facts["frames"])]
     elif rigs and not any("wind" in recorded(prim) for prim in curves):
         stops.append(not_animated(rigs[0]))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notes on the time codes of a bake: whether the animation covers them, and how long a frame is."""
+"""Notes on the time codes of a bake: whether the animation covers them, and what the stage says of its range and of frames."""
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -22,7 +23,19 @@ def asked_notes(stage: Usd.Stage, rigs: Iterable[StageRig], codes: list[float], 
         codes: the time codes, ascending.
         loop: hair moves on outside of the animation, too, as `StageRig.loop_notes` tells.
     """
-    return unsaved_notes(stage) + [text for rig in rigs if not loop for text in out_of_range(rig, codes[0], codes[-1])]
+    out = [text for rig in rigs if not loop for text in out_of_range(rig, codes[0], codes[-1])]
+    return unsaved_notes(stage) + without_range(stage) + out
+
+
+def without_range(stage: Usd.Stage) -> list[str]:
+    """The note on a range of the stage that cannot be meant."""
+    first, last = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    if not stage.HasAuthoredTimeCodeRange() or -math.inf < first <= last < math.inf:
+        return []
+    return [
+        f"{stage.GetRootLayer().GetDisplayName()}: from its startTimeCode {first:g} to its endTimeCode {last:g} is no range, so the "
+        "animation's own counts; author both"
+    ]
 
 
 def out_of_range(rig: StageRig, first: float, last: float) -> list[str]:
