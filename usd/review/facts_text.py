@@ -42,10 +42,10 @@ def as_text(facts: dict, indent: int = 0) -> str:
 def _each(name: str, entries: list[dict], indent: int) -> list[str]:
     """Lines of several facts of one kind: a line each if they are short."""
     pad = "  " * indent
-    if len(entries[0]) <= 3:
+    if len(entries[0]) <= 3 and not any(isinstance(value, list) for value in entries[0].values()):
         lines = [f"{pad}{name}:"]
         for (_, first), *others in (entry.items() for entry in entries):
-            lines.append(f"{pad}  {first}: {', '.join(f'{k} {_short(k, v)}' for k, v in others)}")
+            lines.append(f"{pad}  {first}: {', '.join(f'{k} {v}' for k, v in others)}")
         return lines
     lines = []
     for entry, *same in grouped(entries, lambda entry: without_paths(repr(entry))):
@@ -71,7 +71,7 @@ def _short(name: str, value) -> str:
     """A fact's value, or list of values, in a line."""
     if isinstance(value, list):
         if name in ENDS:
-            return " to ".join(map(_of_one, value))
+            return " to ".join(map(_of_one, value)) or "none"
         own = name == "joint names" and all(isinstance(joint, str) for joint in value)
         return ", ".join(map(leaf if own else str, value)) or "none"
     return "none" if value is None or value == {} else _of_one(value)

@@ -134,7 +134,7 @@ def test_joints_are_listed_where_the_user_is_asked_for_the_head(tmp_path):
     path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound="none")))
     text = as_text(inspect(path))
     assert "/Hero/Rig: no joint is named like a head; name it with --head JOINT" in text
-    assert "  /Hero/Rig: joint names hips, spine, Hals, Kopf, arm_L" in text
+    assert "skeletons left out:\n  path: /Hero/Rig\n  joint names: hips, spine, Hals, Kopf, arm_L" in text
     assert "skeletons left out" not in inspect(path, head="Kopf")
     stage = Usd.Stage.Open(str(path))
     stage.GetPrimAtPath("/Hero/Rig").RemoveProperty("joints")
