@@ -65,6 +65,8 @@ def import_groom(
         NeuralocksError: the source cannot be read, the target cannot be written, or the character has no head with skin.
     """
     sources = [as_path(each, "source") for each in (source if isinstance(source, list | tuple) else [source])]
+    if not sources:
+        raise NeuralocksError("source: is an empty list; name the hair files to import")
     out, rig, over, notes, found = as_path(out, "out"), None, None, [], []
     check_layer_name(out)
     with_character = flag("--with-character", with_character)

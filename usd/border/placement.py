@@ -61,12 +61,14 @@ class Placement:
         """
         if self._still is not None:
             return self._still
-        if time_code not in self._known:
+        found = self._known.get(time_code)
+        if found is None:
             if len(self._known) >= KEPT:
-                self._known.clear()
-            self._known[time_code] = self._evaluate(Usd.TimeCode(time_code))
-            self._known[time_code].flags.writeable = False
-        return self._known[time_code]
+                self._known.clear()  # other threads may be about to look there
+            found = self._evaluate(Usd.TimeCode(time_code))
+            found.flags.writeable = False
+            self._known[time_code] = found
+        return found
 
     @property
     def reference(self) -> np.ndarray:

@@ -196,3 +196,9 @@ def test_thousands_of_curves_of_one_name_get_names_at_once():
     for _ in range(100):
         taken.add(_free_path(stage, Sdf.Path("/Groom"), "Hair", numbers))
     assert len(taken) == 100 and Sdf.Path("/Groom/Hair_100") in taken and stage.asked <= 300
+
+
+def test_no_file_at_all_is_refused(tmp_path):
+    with pytest.raises(NeuralocksError, match="^source: is an empty list; name the hair files"):
+        import_groom([], tmp_path / "out.usda")
+    assert not list(tmp_path.iterdir())
