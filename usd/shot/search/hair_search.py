@@ -115,7 +115,7 @@ class HairSearch:
             closed = {prim: str(prim.GetPath()) for prim in curves if is_closed(prim) and not self._baked_with(prim)}
             self._controls += closed.values()
             curves = [prim for prim in curves if prim not in closed]
-        empty = [] if self._named else without_points(curves)
+        empty = {} if self._named else without_points(curves)
         self._notes += few([no_points(str(prim.GetPath())) for prim in empty])
         return [prim for prim in curves if prim not in empty]
 

@@ -43,14 +43,14 @@ def find_curves(stage: Usd.Stage, wanted=None) -> list[Usd.Prim]:
     return [prim for prim in every if prim in chosen]
 
 
-def without_points(prims: list[Usd.Prim]) -> list[Usd.Prim]:
-    """The curves that are empty, unless all are: exporters leave such prims behind."""
-    empty = []
+def without_points(prims: list[Usd.Prim]) -> dict[Usd.Prim, None]:
+    """The curves that are empty, as keys in the order given, unless all are: exporters leave such prims behind, some by the thousand."""
+    empty = {}
     for prim in prims:
         points = rest_value(UsdGeom.BasisCurves(prim).GetPointsAttr())
         if points is None or hasattr(points, "__len__") and not len(points):
-            empty.append(prim)
-    return empty if len(empty) < len(prims) else []
+            empty[prim] = None
+    return empty if len(empty) < len(prims) else {}
 
 
 def rest_points(prim: Usd.Prim) -> np.ndarray:
