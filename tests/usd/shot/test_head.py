@@ -130,6 +130,17 @@ def test_a_broken_binding_that_would_tell_the_head_is_named_first(tmp_path):
         read_shot(path)
 
 
+def test_curves_that_cannot_be_read_do_not_hide_the_binding_that_tells_the_head(tmp_path):
+    path = _without_a_head_by_name(write_shot(tmp_path, Recipe()))
+    stage = Usd.Stage.Open(str(path))
+    cable = UsdGeom.BasisCurves.Define(stage, "/Set/Cable").GetPrim()
+    cable.RemoveProperty("points")
+    spec = stage.GetRootLayer().GetPrimAtPath("/Set/Cable")
+    Sdf.AttributeSpec(spec, "points", Sdf.ValueTypeNames.StringArray).default = ["a", "b"]
+    stage.GetRootLayer().Save()
+    assert read_shot(path, grooms=["/Hero/Hair"]).grooms[0].joint == "hips/spine/Hals/Kopf"
+
+
 def test_joints_are_listed_where_the_user_is_asked_for_the_head(tmp_path):
     path = _without_a_head_by_name(write_shot(tmp_path, Recipe(bound="none")))
     text = as_text(inspect(path))

@@ -65,7 +65,7 @@ def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
     broken: list[NeuralocksError] = []
     curves = find_curves(rig.joints.prim.GetStage())
     empty = without_points(curves)
-    for prim in sorted((p for p in curves if p not in empty), key=lambda prim: -len(rest_points(prim))):
+    for prim in sorted((p for p in curves if p not in empty), key=_points_of, reverse=True):
         told = recorded_joint(prim)
         if told in rig.joints.names:
             return told, f"told by the bake of {prim.GetPath()}"
@@ -79,6 +79,14 @@ def _carrying(rig: StageRig, seated: bool) -> tuple[str, str] | None:
     if broken:
         raise broken[0]
     return None
+
+
+def _points_of(prim: Usd.Prim) -> int:
+    """How many points curves have; 0 if they cannot be read, which matters only if they are hair."""
+    try:
+        return len(rest_points(prim))
+    except NeuralocksError:
+        return 0
 
 
 def _explained(rig: StageRig, why: str) -> StageRig:
